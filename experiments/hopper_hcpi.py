@@ -1,0 +1,8 @@
+"""HCP-I on 1000 hoppers: v_h is learned with the policy (paper, section 3.2). Preset: fast."""
+
+from hcp_jax import presets
+from hcp_jax.config import Config
+
+
+def get_config() -> Config:
+    return presets.hopper("hopper_hcpi", encoding="embedding")

@@ -1,0 +1,305 @@
+"""PPO on a robot pool (paper, algorithm 2; Schulman et al. 2017).
+
+train(state, n):                         one jitted call, buffers donated
+  for each of n iterations:
+    collect                              num_envs x unroll_length control steps
+    compute_advantages                   GAE with termination and truncation apart
+    for each epoch, each minibatch:      clipped surrogate + value + entropy (+ forward model), Adam
+                                         networks and embedding have their own step sizes
+"""
+
+from typing import Protocol
+
+import chex
+import jax
+import jax.numpy as jnp
+import optax
+from brax.training.acme import running_statistics, specs
+from flax import struct
+
+from hcp_jax.algorithms.returns import compute_gae
+from hcp_jax.config import EmbeddingConfig, PPOConfig
+from hcp_jax.envs.base import EnvState, Transition
+from hcp_jax.policies.conditioning import Conditioning
+from hcp_jax.policies.distribution import gaussian_entropy, gaussian_log_prob, sample_gaussian
+from hcp_jax.policies.networks import ActorCritic
+
+Params = dict  # {"network": ..., "embedding": [N, K] or None}
+
+
+class Env(Protocol):
+    """What PPO needs of an environment (`hcp_jax.envs.base.PoolEnv`)."""
+
+    observation_size: int
+    action_size: int
+    num_robots: int
+
+    def initial_index(self, key: chex.PRNGKey, num_envs: int) -> chex.Array: ...
+    def reset(self, key: chex.PRNGKey, index: chex.Array) -> EnvState: ...
+    def step(self, state: EnvState, action: chex.Array) -> tuple[EnvState, Transition]: ...
+
+
+@struct.dataclass
+class Batch:
+    """Flattened samples of one iteration; every leaf has leading axis [T * B]."""
+
+    obs: chex.Array
+    next_obs: chex.Array
+    action: chex.Array
+    executed_action: chex.Array
+    log_prob: chex.Array
+    value: chex.Array
+    advantage: chex.Array
+    target: chex.Array
+    index: chex.Array
+    continues: chex.Array
+
+
+@struct.dataclass
+class PPOState:
+    """Everything that training carries from one iteration to the next.
+
+    diverged: [N] int32 episodes that each robot lost to non-finite physics; overflow: [] int32 worlds that ever overflowed;
+    sums: running sums of metrics since they were last read.
+    """
+
+    params: Params
+    opt_state: optax.OptState
+    obs_statistics: running_statistics.RunningStatisticsState
+    delta_statistics: running_statistics.RunningStatisticsState
+    env_state: EnvState
+    key: chex.PRNGKey
+    diverged: chex.Array
+    overflow: chex.Array
+    sums: dict[str, chex.Array]
+
+
+LOSS_METRICS = ("policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "prediction_loss")
+SUMS = (*LOSS_METRICS, "iterations", "episodes", "episode_return", "episode_length", "value_error", "target_variance")
+
+
+def zero_sums() -> dict[str, chex.Array]:
+    return {name: jnp.zeros(()) for name in SUMS}
+
+
+class PPO:
+    """PPO for one environment and one source of v_h. Holds no state of its own."""
+
+    def __init__(
+        self,
+        env: Env,
+        conditioning: Conditioning,
+        config: PPOConfig,
+        embedding: EmbeddingConfig,
+        num_envs: int,
+        num_iterations: int,
+        train_network: bool = True,
+    ):
+        """Args:
+        env: a vectorised environment over a pool.
+        conditioning: the source of v_h for the robots of that pool.
+        config, embedding: settings; `num_minibatches` must divide `num_envs * unroll_length`.
+        num_envs: parallel environments.
+        num_iterations: length of the run, for the learning rate's decay.
+        train_network: False freezes the networks and trains the embedding alone.
+        """
+        self.env, self.conditioning, self.config, self.embedding = env, conditioning, config, embedding
+        self.num_envs, self._train_network = num_envs, train_network
+        self._predicts = conditioning.is_learned and embedding.prediction_cost > 0
+        self.network = ActorCritic(
+            env.action_size, env.observation_size, config.hidden_sizes, config.initial_log_std, self._predicts
+        )
+        self._optimizer = self._make_optimizer(num_iterations)
+        self.train = jax.jit(self._train, donate_argnums=0)
+
+    def _make_optimizer(self, num_iterations: int) -> optax.GradientTransformation:
+        config = self.config
+        num_updates = num_iterations * config.num_epochs * config.num_minibatches
+        decay = config.final_learning_rate / config.learning_rate
+        network = optax.chain(
+            optax.clip_by_global_norm(config.max_grad_norm),
+            optax.adam(optax.linear_schedule(config.learning_rate, config.learning_rate * decay, num_updates), eps=1e-5),
+        )
+        embedding_rate = self.embedding.learning_rate
+        embedding = optax.adam(optax.linear_schedule(embedding_rate, embedding_rate * decay, num_updates), eps=1e-8)
+        return optax.multi_transform(
+            {"network": network if self._train_network else optax.set_to_zero(), "embedding": embedding},
+            {"network": "network", "embedding": "embedding"},
+        )
+
+    def init_params(self, key: chex.PRNGKey) -> Params:
+        key_network, key_embedding = jax.random.split(key)
+        obs, action = jnp.zeros((1, self.env.observation_size)), jnp.zeros((1, self.env.action_size))
+        network = self.network.init(key_network, obs, action, jnp.zeros((1, self.conditioning.size)))
+        return {"network": network, "embedding": self.conditioning.init(key_embedding)}
+
+    def init(self, key: chex.PRNGKey) -> PPOState:
+        """The state before the first iteration."""
+        key, key_params, key_index, key_env = jax.random.split(key, 4)
+        params = self.init_params(key_params)
+        spec = specs.Array((self.env.observation_size,), jnp.float32)
+        return PPOState(
+            params=params,
+            opt_state=self._optimizer.init(params),
+            obs_statistics=running_statistics.init_state(spec),
+            delta_statistics=running_statistics.init_state(spec),
+            env_state=self.env.reset(key_env, self.env.initial_index(key_index, self.num_envs)),
+            key=key,
+            diverged=jnp.zeros(self.env.num_robots, jnp.int32),
+            overflow=jnp.int32(0),
+            sums=zero_sums(),
+        )
+
+    def normalize(self, obs: chex.Array, statistics: running_statistics.RunningStatisticsState) -> chex.Array:
+        """The observation as the networks see it."""
+        if not self.config.normalize_observation:
+            return obs
+        return running_statistics.normalize(obs, statistics, max_abs_value=10.0)
+
+    def mean_action(self, network: dict, statistics, obs: chex.Array, v_h: chex.Array) -> chex.Array:
+        """The deterministic policy: obs [B, O], v_h [B, K] -> action [B, A]."""
+        return self.network.apply(network, self.normalize(obs, statistics), v_h, method="act")[0]
+
+    def _train(self, state: PPOState, num_iterations: chex.Array) -> PPOState:
+        return jax.lax.fori_loop(0, num_iterations, lambda _, s: self._train_iteration(s), state)
+
+    def _train_iteration(self, state: PPOState) -> PPOState:
+        key, key_collect, key_update = jax.random.split(state.key, 3)
+        env_state, (transitions, log_prob, action) = self._collect(state, key_collect)
+        batch, episode_sums = self._make_batch(state, transitions, log_prob, action)
+        params, opt_state, losses = self._update(state, batch, key_update)
+        deltas = (transitions.next_obs - transitions.obs).reshape(-1, self.env.observation_size)
+        sums = {"iterations": jnp.ones(()), **episode_sums, **{k: jnp.mean(v) for k, v in losses.items()}}
+        return PPOState(
+            params=params,
+            opt_state=opt_state,
+            obs_statistics=self._update_statistics(state.obs_statistics, batch.obs),
+            delta_statistics=self._update_statistics(state.delta_statistics, deltas),
+            env_state=env_state,
+            key=key,
+            diverged=state.diverged.at[transitions.index].add(transitions.diverged.astype(jnp.int32)),
+            overflow=state.overflow + jnp.sum(transitions.overflow),
+            sums={name: state.sums[name] + sums[name] for name in SUMS},
+        )
+
+    def _update_statistics(self, statistics: running_statistics.RunningStatisticsState, rows: chex.Array):
+        return running_statistics.update(statistics, rows) if self._train_network else statistics
+
+    def _collect(self, state: PPOState, key: chex.PRNGKey):
+        """Rolls the current policy out: transitions, log_prob, sampled action, each [T, B, ...]."""
+
+        def step(env_state, key_action):
+            v_h = self.conditioning.v_h(state.params["embedding"], env_state.index)
+            obs = self.normalize(env_state.obs, state.obs_statistics)
+            mean, log_std = self.network.apply(state.params["network"], obs, v_h, method="act")
+            action = sample_gaussian(mean, log_std, key_action)
+            log_prob = gaussian_log_prob(mean, log_std, action)
+            env_state, transition = self.env.step(env_state, action)
+            return env_state, (transition, log_prob, action)
+
+        return jax.lax.scan(step, state.env_state, jax.random.split(key, self.config.unroll_length))
+
+    def _make_batch(self, state: PPOState, transitions: Transition, log_prob, action) -> tuple[Batch, dict]:
+        config = self.config
+        v_h = self.conditioning.v_h(state.params["embedding"], transitions.index)
+        obs = self.normalize(transitions.obs, state.obs_statistics)
+        next_obs = self.normalize(transitions.next_obs, state.obs_statistics)
+        value = self.network.apply(state.params["network"], obs, v_h, method="value")
+        next_value = self.network.apply(state.params["network"], next_obs, v_h, method="value")
+        advantage, target = compute_gae(
+            transitions.reward * config.reward_scale,
+            value,
+            next_value,
+            transitions.terminated,
+            transitions.truncated,
+            config.gamma,
+            config.gae_lambda,
+        )
+        batch = Batch(
+            obs=transitions.obs,
+            next_obs=transitions.next_obs,
+            action=action,
+            executed_action=transitions.action,
+            log_prob=log_prob,
+            value=value,
+            advantage=(advantage - advantage.mean()) / (advantage.std() + 1e-8),
+            target=target,
+            index=transitions.index,
+            continues=~transitions.terminated,
+        )
+        done = transitions.done
+        sums = {
+            "episodes": jnp.sum(done, dtype=jnp.float32),
+            "episode_return": jnp.sum(jnp.where(done, transitions.episode_return, 0.0)),
+            "episode_length": jnp.sum(jnp.where(done, transitions.episode_length, 0).astype(jnp.float32)),
+            "value_error": jnp.mean(jnp.square(target - value)),
+            "target_variance": jnp.var(target),
+        }
+        return jax.tree.map(lambda x: x.reshape((-1,) + x.shape[2:]), batch), sums
+
+    def _update(self, state: PPOState, batch: Batch, key: chex.PRNGKey):
+        num_samples = batch.obs.shape[0]
+
+        def minibatch_step(carry, rows):
+            params, opt_state = carry
+            minibatch = jax.tree.map(lambda x: x[rows], batch)
+            grads, metrics = jax.grad(self._loss, has_aux=True)(params, minibatch, state)
+            updates, opt_state = self._optimizer.update(grads, opt_state, params)
+            return (optax.apply_updates(params, updates), opt_state), metrics
+
+        def epoch(carry, key_epoch):
+            rows = jax.random.permutation(key_epoch, num_samples)
+            return jax.lax.scan(minibatch_step, carry, rows.reshape(self.config.num_minibatches, -1))
+
+        keys = jax.random.split(key, self.config.num_epochs)
+        (params, opt_state), metrics = jax.lax.scan(epoch, (state.params, state.opt_state), keys)
+        return params, opt_state, metrics
+
+    def _loss(self, params: Params, batch: Batch, state: PPOState) -> tuple[chex.Array, dict]:
+        config = self.config
+        v_h = self.conditioning.v_h(params["embedding"], batch.index)
+        policy_v_h = v_h if self.embedding.policy_gradient else jax.lax.stop_gradient(v_h)
+        obs = self.normalize(batch.obs, state.obs_statistics)
+        mean, log_std = self.network.apply(params["network"], obs, policy_v_h, method="act")
+        value = self.network.apply(params["network"], obs, policy_v_h, method="value")
+        log_ratio = gaussian_log_prob(mean, log_std, batch.action) - batch.log_prob
+        policy_loss = clipped_surrogate(log_ratio, batch.advantage, config.clip_eps)
+        value_loss = clipped_value_loss(value, batch.value, batch.target, config.value_clip_eps)
+        entropy = gaussian_entropy(log_std)
+        loss = policy_loss + config.value_cost * value_loss - config.entropy_cost * entropy
+        prediction_loss = jnp.zeros(())
+        if self._predicts:
+            prediction_loss = self._prediction_loss(params, batch, obs, v_h, state)
+            loss += self.embedding.prediction_cost * prediction_loss
+        metrics = {
+            "policy_loss": policy_loss,
+            "value_loss": value_loss,
+            "entropy": entropy,
+            "approx_kl": jnp.mean(jnp.exp(log_ratio) - 1.0 - log_ratio),
+            "clip_fraction": jnp.mean((jnp.abs(jnp.exp(log_ratio) - 1.0) > config.clip_eps).astype(jnp.float32)),
+            "prediction_loss": prediction_loss,
+        }
+        return loss, metrics
+
+    def _prediction_loss(self, params: Params, batch: Batch, obs, v_h, state: PPOState) -> chex.Array:
+        """Mean absolute error of the predicted change of the observation, robust to the kicks of contacts."""
+        statistics = state.delta_statistics
+        change = running_statistics.normalize(batch.next_obs - batch.obs, statistics, max_abs_value=5.0)
+        predicted = self.network.apply(params["network"], obs, batch.executed_action, v_h, method="predict")
+        return jnp.mean(optax.huber_loss(predicted, change, delta=1.0))
+
+
+def clipped_surrogate(log_ratio: chex.Array, advantage: chex.Array, clip_eps: float) -> chex.Array:
+    """Negative clipped surrogate objective (Schulman et al. 2017, eq. 7), averaged: []."""
+    ratio = jnp.exp(log_ratio)
+    clipped = jnp.clip(ratio, 1.0 - clip_eps, 1.0 + clip_eps)
+    return -jnp.mean(jnp.minimum(ratio * advantage, clipped * advantage))
+
+
+def clipped_value_loss(value: chex.Array, old_value: chex.Array, target: chex.Array, clip_eps: float) -> chex.Array:
+    """Half the mean squared error, the larger of plain and clipped; `clip_eps` 0 does not clip: []."""
+    loss = jnp.square(value - target)
+    if clip_eps > 0:
+        clipped = old_value + jnp.clip(value - old_value, -clip_eps, clip_eps)
+        loss = jnp.maximum(loss, jnp.square(clipped - target))
+    return 0.5 * jnp.mean(loss)

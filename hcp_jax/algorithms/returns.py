@@ -1,0 +1,36 @@
+"""Returns and advantages of trajectories that end by termination, by truncation, or not at all."""
+
+import chex
+import jax
+import jax.numpy as jnp
+
+
+def compute_gae(
+    reward: chex.Array,
+    value: chex.Array,
+    next_value: chex.Array,
+    terminated: chex.Array,
+    truncated: chex.Array,
+    gamma: float,
+    gae_lambda: float,
+) -> tuple[chex.Array, chex.Array]:
+    """Generalised advantage estimation (Schulman et al. 2016, eq. 16) over [T, B] arrays.
+
+    delta_t = r_t + gamma (1 - terminated_t) V(s'_t) - V(s_t), where s'_t is the state that step t led to, before any reset;
+    A_t = delta_t + gamma lambda (1 - done_t) A_{t+1}. Termination stops the bootstrap; truncation only cuts the trace.
+
+    Returns:
+        advantages [T, B] and value targets A + V [T, B].
+    """
+    chex.assert_rank([reward, value, next_value, terminated, truncated], 2)
+    chex.assert_equal_shape([reward, value, next_value, terminated, truncated])
+    delta = reward + gamma * jnp.where(terminated, 0.0, next_value) - value
+    trace = gamma * gae_lambda * jnp.where(terminated | truncated, 0.0, 1.0)
+
+    def backward(advantage, inputs):
+        delta_t, trace_t = inputs
+        advantage = delta_t + trace_t * advantage
+        return advantage, advantage
+
+    _, advantages = jax.lax.scan(backward, jnp.zeros_like(delta[0]), (delta, trace), reverse=True)
+    return advantages, advantages + value

@@ -1,0 +1,114 @@
+"""What the commands share: reading an experiment file, overriding its fields, and ending on bad input with one line."""
+
+import argparse
+import contextlib
+import os
+import pathlib
+import re
+import runpy
+import sys
+from collections.abc import Iterator, Sequence
+
+import jax
+from absl import flags
+from ml_collections import ConfigDict, config_flags
+
+from hcp_jax.config import Config, ConfigError, field_names, from_dict, to_dict, unknown_field
+from hcp_jax.hardware.pool import PoolError
+from hcp_jax.hardware.ranges import RangeError
+from hcp_jax.physics.base import PhysicsOverflowError
+from hcp_jax.training.checkpoint import CheckpointError
+from hcp_jax.training.run_folder import RunFolderError
+
+BAD_INPUT = 2
+_USER_ERRORS = (ConfigError, RangeError, RunFolderError, CheckpointError, PoolError)
+_OVERRIDE = re.compile(r"--config\.([^=\s]+)(=.*)?$", re.DOTALL)
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """argparse, but an error is one line."""
+
+    def __init__(self, **kwargs):
+        super().__init__(allow_abbrev=False, **kwargs)
+
+    def error(self, message: str):
+        self.exit(BAD_INPUT, f"{self.prog}: {message}\n")
+
+
+@contextlib.contextmanager
+def user_errors_end_the_command() -> Iterator[None]:
+    """Bad input ends the process with one line on stderr and exit code 2; a physics overflow with exit code 1."""
+    try:
+        yield
+    except _USER_ERRORS as error:
+        print(_one_line(error), file=sys.stderr)
+        sys.exit(BAD_INPUT)
+    except PhysicsOverflowError as error:
+        print(_one_line(error), file=sys.stderr)
+        sys.exit(1)
+
+
+def enable_compilation_cache() -> None:
+    """Keeps compiled programs between runs, in `JAX_COMPILATION_CACHE_DIR` or the user's cache folder."""
+    if not jax.config.jax_compilation_cache_dir:
+        cache = pathlib.Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser()
+        jax.config.update("jax_compilation_cache_dir", str(cache / "hcp_jax" / "xla"))
+
+
+def load_config(path: str, overrides: Sequence[str] = ()) -> Config:
+    """Runs an experiment file (a Python file: it is executed) and applies `--config.FIELD=VALUE` overrides.
+
+    Raises:
+        ConfigError: the file is missing, raises or gives no `Config`; a field is unknown or its value ill-typed.
+    """
+    return apply_overrides(_run_experiment(path, "get_config", Config), overrides)
+
+
+def load_configs(path: str) -> list[Config]:
+    """Runs an experiment list: a Python file whose `get_configs()` gives several `Config`s."""
+    configs = _run_experiment(path, "get_configs", list)
+    for config in configs:
+        if not isinstance(config, Config):
+            raise ConfigError(f"--config={path}: get_configs() gave {type(config).__name__}, expected Config")
+    return configs
+
+
+def _run_experiment(path: str, function: str, kind: type):
+    if not pathlib.Path(path).is_file():
+        raise ConfigError(f"--config={path}: no such file")
+    try:
+        result = runpy.run_path(path)[function]()
+    except KeyError as error:
+        raise ConfigError(f"--config={path}: KeyError: {error} (an experiment file defines {function}())") from error
+    except (ConfigError, RangeError):
+        raise
+    except (Exception, SystemExit) as error:
+        raise ConfigError(f"--config={path}: raised {type(error).__name__}: {error}") from error
+    if not isinstance(result, kind):
+        raise ConfigError(f"--config={path}: {function}() gave {type(result).__name__}, expected {kind.__name__}")
+    return result
+
+
+def apply_overrides(config: Config, overrides: Sequence[str]) -> Config:
+    """A new config with the fields that `--config.FIELD=VALUE` arguments name. Raises ConfigError."""
+    known = field_names(Config)
+    for argument in overrides:
+        match = _OVERRIDE.match(argument)
+        if argument.startswith("-") and not match:
+            raise ConfigError(f"{argument}: unknown argument; fields of the config are set by --config.FIELD=VALUE")
+        if match and match[1] not in known:
+            raise ConfigError(unknown_field(f"--config.{match[1]}", [f"--config.{name}" for name in known]))
+    values = flags.FlagValues()
+    arguments = ["hcp_jax", *overrides]
+    config_flags.DEFINE_config_dict("config", ConfigDict(to_dict(config)), flag_values=values, sys_argv=arguments)
+    try:
+        rest = values(arguments)
+    except (flags.Error, ValueError, TypeError, KeyError, AttributeError, SyntaxError) as error:
+        raise ConfigError(_one_line(error)) from error
+    if len(rest) > 1:
+        raise ConfigError(f"{rest[1]}: unexpected argument")
+    return from_dict(Config, values.config.to_dict())
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,1 @@
+"""Vectorised environments over a robot pool."""

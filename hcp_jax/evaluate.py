@@ -1,0 +1,53 @@
+"""`python -m hcp_jax.evaluate RUN [--trials 10] [--robots-per-trial 100] [--physics native-rk4] [--json FILE]`"""
+
+import pathlib
+
+from rich.console import Console
+from rich.table import Table
+
+from hcp_jax import command_line
+from hcp_jax.config import ConfigError
+from hcp_jax.evaluation.statistics import write_json
+from hcp_jax.evaluation.sweeps import evaluate_folder
+from hcp_jax.physics.base import INTEGRATORS, PHYSICS
+
+
+def main(arguments: list[str] | None = None) -> None:
+    parser = command_line.OneLineParser(prog="hcp_jax.evaluate", description="Evaluates the policy of a run folder.")
+    parser.add_argument("run", type=pathlib.Path, help="run folder")
+    parser.add_argument("--trials", type=int, default=10)
+    parser.add_argument("--robots-per-trial", type=int, default=100)
+    parser.add_argument("--physics", default="auto", choices=[*PHYSICS, *(f"native-{name}" for name in INTEGRATORS)])
+    parser.add_argument("--fit-steps", type=int, help="control steps for fitting v_h of new robots (HCP-I); 0 skips it")
+    parser.add_argument("--types", nargs="*", help="robot types to evaluate (the hopper has one: hopper)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the initial states")
+    parser.add_argument("--json", type=pathlib.Path, help="file to write the whole record to")
+    options = parser.parse_args(arguments)
+    with command_line.user_errors_end_the_command():
+        for name in ("trials", "robots_per_trial"):
+            if getattr(options, name) < 1:
+                raise ConfigError(f"--{name.replace('_', '-')}={getattr(options, name)}: expected at least 1")
+        if options.types and options.types != ["hopper"]:
+            raise ConfigError(f"--types={' '.join(options.types)}: expected hopper")
+        command_line.enable_compilation_cache()
+        record = evaluate_folder(
+            options.run, options.trials, options.robots_per_trial, options.physics, options.fit_steps, options.seed
+        )
+    print_table(record)
+    if options.json:
+        write_json(options.json, record)
+
+
+def print_table(record: dict) -> None:
+    """Shows the record's sets, one row each."""
+    title = f"{record['run']}: {record['encoding']}, {record['checkpoint_env_steps']:,} steps, {record['physics']}"
+    table = Table(title=f"{title}, {record['trials']} trials x {record['robots_per_trial']} robots")
+    for column in ("robots", "return", "std over trials", "episode length"):
+        table.add_column(column, justify="left" if column == "robots" else "right")
+    for name, values in record["sets"].items():
+        table.add_row(name, *(f"{values[key]:.1f}" for key in ("return_mean", "return_std", "episode_length_mean")))
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,43 @@
+"""What an evaluation says: statistics over trials, per robot type and per robot."""
+
+import json
+from collections.abc import Sequence
+
+import numpy as np
+
+from hcp_jax.envs.episodes import Episodes
+from hcp_jax.hardware.pool import RobotPool
+
+
+def summarise_trials(trials: Sequence[Episodes]) -> dict[str, float]:
+    """Mean return and its standard deviation over trials (each trial: the mean over its robots), and mean length."""
+    means = np.asarray([trial.episode_return.mean() for trial in trials])
+    return {
+        "return_mean": float(means.mean()),
+        "return_std": float(means.std()),
+        "episode_length_mean": float(np.mean([trial.episode_length.mean() for trial in trials])),
+    }
+
+
+def robot_rows(pool: RobotPool, trials: Sequence[Episodes]) -> list[dict]:
+    """One record per episode: robot id, return, length, whether its physics diverged, and its hardware in SI units."""
+    rows = []
+    for number, trial in enumerate(trials):
+        for i, index in enumerate(trial.index):
+            rows.append(
+                {
+                    "trial": number,
+                    "robot_id": int(pool.robot_id[index]),
+                    "return": round(float(trial.episode_return[i]), 3),
+                    "episode_length": int(trial.episode_length[i]),
+                    "diverged": bool(trial.diverged[i]),
+                    "hardware": {name: [round(float(v), 6) for v in values[index]] for name, values in pool.hardware.items()},
+                }
+            )
+    return rows
+
+
+def write_json(path, record: dict) -> None:
+    """Writes one record, indented, with numbers that JSON has."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")

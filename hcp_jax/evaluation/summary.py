@@ -1,0 +1,54 @@
+"""One row per algorithm from run folders: what `results/*/summary.json` holds."""
+
+import collections
+import json
+import pathlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from hcp_jax.config import Config
+from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE, read_rows
+from hcp_jax.training.run_folder import ENVIRONMENT_FILE, read_config
+
+ALGORITHM_NAMES = {"none": "PPO", "kinematics": "HCP-E", "kinematics+dynamics": "HCP-E+Dyn", "embedding": "HCP-I", "random": "PPO+random"}
+RETURNS = ("train_return", "heldout_return", "heldout_fitted_return")
+
+
+def summarise_runs(folders: Sequence[pathlib.Path]) -> list[dict]:
+    """Groups finished runs by configuration (seed aside) and averages their last evaluations.
+
+    Returns:
+        Rows with `algorithm`, `encoding`, `name`, `seeds`, `env_steps`, mean and standard deviation over seeds of each
+        return in `RETURNS`, `wall_seconds` (mean) and `commit`.
+    """
+    groups = collections.defaultdict(list)
+    for folder in folders:
+        rows = read_rows(folder / METRICS_FILE)
+        if rows:
+            config = read_config(folder)
+            groups[(config.name, int(rows[-1]["env_steps"]))].append((config, folder, rows[-1]))
+    return [_summarise_group(name, env_steps, runs) for (name, env_steps), runs in groups.items()]
+
+
+def _summarise_group(name: str, env_steps: int, runs: list[tuple[Config, pathlib.Path, dict]]) -> dict:
+    config = runs[0][0]
+    row = {
+        "algorithm": ALGORITHM_NAMES[config.encoding],
+        "encoding": config.encoding,
+        "name": name,
+        "seeds": sorted(run.seed for run, _, _ in runs),
+        "env_steps": env_steps,
+    }
+    for key in RETURNS:
+        values = [float(last[f"{key}_mean"]) for _, _, last in runs if last.get(f"{key}_mean")]
+        row[f"{key}_mean"] = round(float(np.mean(values)), 1) if values else None
+        row[f"{key}_std"] = round(float(np.std(values)), 1) if values else None
+    seconds = [float(read_rows(folder / TIMING_FILE)[-1]["seconds"]) for _, folder, _ in runs]
+    row["wall_seconds"] = round(float(np.mean(seconds)), 1)
+    row["commit"] = sorted({_commit(folder) for _, folder, _ in runs})
+    return row
+
+
+def _commit(folder: pathlib.Path) -> str:
+    return json.loads((folder / ENVIRONMENT_FILE).read_text())["commit"] or "unknown"

@@ -1,0 +1,94 @@
+"""Evaluation of a run folder over many trials, on robots trained on and on new ones."""
+
+import pathlib
+
+import jax
+import numpy as np
+
+from hcp_jax.algorithms.ppo import PPOState
+from hcp_jax.envs.episodes import Episodes, Evaluator
+from hcp_jax.evaluation.statistics import robot_rows, summarise_trials
+from hcp_jax.experiment import Experiment, fit_embedding, heldout_v_h, make_experiment, make_heldout_pool, train_v_h
+from hcp_jax.hardware.pool import RobotPool
+from hcp_jax.training import run_folder
+from hcp_jax.training.warm_start import load_state
+
+
+def evaluate_folder(
+    folder: pathlib.Path,
+    trials: int,
+    robots_per_trial: int,
+    physics: str = "auto",
+    fit_steps: int | None = None,
+    seed: int = 0,
+) -> dict:
+    """Evaluates the newest checkpoint of a run folder.
+
+    Training robots are taken in order, all of them before any twice; new robots are held-out robots
+    0..trials*robots_per_trial-1, one episode each. Where v_h is learned, new robots get the mean embedding (`heldout`)
+    and, if `fit_steps` is above 0, a v_h fitted to their experience with the networks frozen (`heldout_fitted`).
+
+    Args:
+        folder: a run folder.
+        trials, robots_per_trial: numbers of trials and of robots in each.
+        physics: engine, may be `native-INTEGRATOR`.
+        fit_steps: control steps for fitting; None takes the config's.
+        seed: seed of the episodes' initial states.
+
+    Returns:
+        The record that `evaluate --json` writes (DESIGN.md, "The command line").
+
+    Raises:
+        RunFolderError, CheckpointError: the folder cannot be evaluated.
+    """
+    config = run_folder.read_config(folder)
+    run = make_experiment(config, physics)
+    iteration, state, skipped = load_state(folder, run)
+    for line in skipped:
+        print(line, flush=True)
+    count = trials * robots_per_trial
+    heldout = make_heldout_pool(config.pool, count)
+    index = np.arange(count) % run.train_pool.num_robots
+    sets = {"train": (run.train_pool, index, train_v_h(run, state.params)[index])}
+    sets["heldout"] = (heldout, np.arange(count), heldout_v_h(run, state.params, heldout))
+    fit_steps = config.embedding.fit_steps if fit_steps is None else fit_steps
+    if run.ppo.conditioning.is_learned and fit_steps:
+        print(f"fitting v_h of {count} new robots for {fit_steps:,} control steps, networks frozen", flush=True)
+        sets["heldout_fitted"] = (heldout, np.arange(count), fit_embedding(run, state, heldout, fit_steps))
+    record = {
+        "run": str(folder),
+        "task": config.task,
+        "algorithm": config.algorithm,
+        "encoding": config.encoding,
+        "physics": run.physics,
+        "integrator": run.physics.partition("-")[2] if run.physics.startswith("native-") else config.env.integrator,
+        "checkpoint_env_steps": iteration * config.batch_size,
+        "commit": run_folder.read_commit(),
+        "trials": trials,
+        "robots_per_trial": robots_per_trial,
+        "types": {},
+        "sets": {},
+        "robots": [],
+    }
+    for name, (pool, rows, v_h) in sets.items():
+        episodes = play_trials(run, state, pool, rows, v_h, trials, jax.random.key(seed))
+        record["sets"][name] = summarise_trials(episodes)
+        record["robots"] += [{"set": name} | row for row in robot_rows(pool, episodes)]
+    shown = record["sets"]["heldout"]
+    record["types"][config.task] = {"zero_shot": True} | shown
+    record["return_mean"], record["return_std"] = shown["return_mean"], shown["return_std"]
+    return record
+
+
+def play_trials(
+    run: Experiment, state: PPOState, pool: RobotPool, rows: np.ndarray, v_h: jax.Array, trials: int, key: jax.Array
+) -> list[Episodes]:
+    """One episode of each of `rows`, all in one jitted call, split into `trials` equal parts."""
+
+    def policy(params, obs, v_h):
+        return run.ppo.mean_action(*params, obs, v_h)
+
+    params = (state.params["network"], state.obs_statistics)
+    episodes = Evaluator(run.make_env(pool), policy)(params, v_h, rows, key)
+    parts = np.split(np.arange(len(rows)), trials)
+    return [episodes.take(part) for part in parts]

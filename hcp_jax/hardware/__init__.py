@@ -1,0 +1,1 @@
+"""Robots as data: parameter ranges, sampled variants, compiled and stacked pools, and their explicit encodings."""

@@ -1,0 +1,59 @@
+"""Explicit encodings of hardware: the fixed vector v_h of each robot in a pool.
+
+| encoding | hopper | length |
+|---|---|---|
+| `none` | nothing | 0 |
+| `kinematics` | 4 link half-lengths (torso, thigh, leg, foot), standardised by the training pool's mean and std | 4 |
+| `kinematics+dynamics` | the above, then 4 body masses, 3 frictionloss, 3 damping, 3 armature, scaled to [0, 1] by the training pool's min and max | 17 |
+| `random` | uniform noise of the same length as `kinematics+dynamics`, fixed per robot: a control | 17 |
+
+The scales come from the training pool, so a held-out robot may lie slightly outside [0, 1].
+"""
+
+import numpy as np
+
+from hcp_jax.hardware.pool import RobotPool
+
+ENCODINGS = ("none", "kinematics", "kinematics+dynamics", "random")
+_DYNAMICS = ("body_mass", "frictionloss", "damping", "armature")
+_RANDOM_ENCODING_SEED = 7919
+
+
+def encode(pool: RobotPool, encoding: str, reference: RobotPool) -> np.ndarray:
+    """The encoding of every robot in `pool`: [N, K] float32, scaled by the statistics of `reference`.
+
+    Raises:
+        ValueError: `encoding` is not one of `ENCODINGS`.
+    """
+    if encoding == "none":
+        return np.zeros((pool.num_robots, 0), np.float32)
+    if encoding == "kinematics":
+        return _kinematics(pool, reference)
+    if encoding == "kinematics+dynamics":
+        return np.concatenate([_kinematics(pool, reference), _dynamics(pool, reference)], axis=1)
+    if encoding == "random":
+        return _random(pool)
+    raise ValueError(f"encoding={encoding!r}: expected one of {', '.join(ENCODINGS)}")
+
+
+def _kinematics(pool: RobotPool, reference: RobotPool) -> np.ndarray:
+    half, reference_half = pool.hardware["link_length"] / 2, reference.hardware["link_length"] / 2
+    std = reference_half.std(axis=0)
+    return ((half - reference_half.mean(axis=0)) / np.where(std > 1e-9, std, 1.0)).astype(np.float32)
+
+
+def _dynamics(pool: RobotPool, reference: RobotPool) -> np.ndarray:
+    values = np.concatenate([pool.hardware[name] for name in _DYNAMICS], axis=1)
+    reference_values = np.concatenate([reference.hardware[name] for name in _DYNAMICS], axis=1)
+    low, high = reference_values.min(axis=0), reference_values.max(axis=0)
+    return ((values - low) / np.where(high - low > 1e-9, high - low, 1.0)).astype(np.float32)
+
+
+def _random(pool: RobotPool) -> np.ndarray:
+    """Noise keyed by the robot's own hardware, so a robot keeps its vector whatever pool it stands in."""
+    width = sum(pool.hardware[name].shape[1] for name in ("link_length", *_DYNAMICS))
+    rows = []
+    for row in range(pool.num_robots):
+        digest = np.frombuffer(b"".join(np.ascontiguousarray(v[row]).tobytes() for v in pool.hardware.values()), np.uint32)
+        rows.append(np.random.default_rng([_RANDOM_ENCODING_SEED, *digest]).uniform(size=width))
+    return np.asarray(rows, np.float32)

@@ -1,0 +1,103 @@
+"""The physics interface and the choice of an engine.
+
+A physics engine advances B worlds, each holding one robot of a pool, under controls held for a number of substeps. Its whole
+state is `PhysicsState`; it keeps nothing between calls, so a rollout can be checkpointed, replayed and moved.
+"""
+
+from typing import Protocol
+
+import chex
+import jax
+import jax.numpy as jnp
+from flax import struct
+
+from hcp_jax.hardware.pool import RobotPool
+
+PHYSICS = ("auto", "mjx-warp", "mjx-jax", "native")
+INTEGRATORS = ("euler", "rk4", "implicitfast")
+MAX_VALUE = 1e10  # MuJoCo's mjMAXVAL: beyond it a state counts as diverged
+
+
+@struct.dataclass
+class PhysicsState:
+    """State of B worlds. qpos: [B, nq]; qvel, qacc_warmstart: [B, nv]. SI units, float32."""
+
+    qpos: chex.Array
+    qvel: chex.Array
+    qacc_warmstart: chex.Array
+
+
+class Physics(Protocol):
+    """Steps worlds on one flat leading axis."""
+
+    def step(
+        self, robots: RobotPool, state: PhysicsState, ctrl: chex.Array, num_substeps: int
+    ) -> tuple[PhysicsState, chex.Array]:
+        """Advances every world by `num_substeps` with `ctrl` [B, nu] held.
+
+        Returns:
+            The new state, with NaN in the rows whose physics diverged, and the number of worlds whose contact or
+            constraint buffer overflowed: [] int32.
+        """
+
+
+def select_rows(mask: chex.Array, on_true: PhysicsState, on_false: PhysicsState) -> PhysicsState:
+    """Rows of `on_true` where `mask` [B] is set, of `on_false` elsewhere."""
+    return jax.tree.map(lambda a, b: jnp.where(mask.reshape((-1,) + (1,) * (a.ndim - 1)), a, b), on_true, on_false)
+
+
+def is_finite(state: PhysicsState) -> chex.Array:
+    """Whether each world's state is usable: [B] bool."""
+    rows = jnp.concatenate([state.qpos, state.qvel], axis=-1)
+    return jnp.all(jnp.isfinite(rows) & (jnp.abs(rows) < MAX_VALUE), axis=-1)
+
+
+def default_physics() -> str:
+    """The engine that `auto` stands for on this machine's default JAX backend (DESIGN.md, decision 4)."""
+    backend = jax.default_backend()
+    if backend == "cpu":
+        return "native"
+    if backend in ("gpu", "cuda"):
+        from hcp_jax.physics import mjx
+
+        return "mjx-warp" if mjx.has_warp() else "mjx-jax"
+    return "mjx-jax"
+
+
+def make_physics(name: str, pool: RobotPool, sim_dt: float, integrator: str) -> Physics:
+    """Builds the engine `name` for the robots of `pool`.
+
+    Args:
+        name: one of `PHYSICS`, or `native-INTEGRATOR` to overrule the integrator (`native-rk4`).
+        pool: `robots` passed to `step` must be rows of this pool.
+        sim_dt: physics time step [s].
+        integrator: one of `INTEGRATORS`.
+
+    Raises:
+        ValueError: the name or the integrator is unknown.
+    """
+    if name == "auto":
+        name = default_physics()
+    if name.startswith("native-"):
+        name, integrator = "native", name.removeprefix("native-")
+    if integrator not in INTEGRATORS:
+        raise ValueError(f"integrator={integrator!r}: expected one of {', '.join(INTEGRATORS)}")
+    if name == "native":
+        from hcp_jax.physics import native
+
+        return native.NativePhysics(pool, sim_dt, integrator)
+    if name in ("mjx-warp", "mjx-jax"):
+        from hcp_jax.physics import mjx
+
+        return mjx.MjxPhysics(pool, sim_dt, integrator, impl=name.removeprefix("mjx-"))
+    raise ValueError(f"physics={name!r}: expected one of {', '.join(PHYSICS)} or native-{{{'|'.join(INTEGRATORS)}}}")
+
+
+class PhysicsOverflowError(RuntimeError):
+    """Contacts or constraints were dropped because a buffer was too small."""
+
+    def __init__(self, num_worlds: int):
+        super().__init__(
+            f"{num_worlds} physics steps overflowed a contact or constraint buffer, so their results are wrong: "
+            "raise max_contacts or max_constraints of MjxPhysics (hcp_jax/physics/mjx.py) or the template's <size memory>"
+        )

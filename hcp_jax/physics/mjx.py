@@ -1,0 +1,90 @@
+"""MJX on XLA or Warp, with per-robot model fields on one flat world axis."""
+
+import functools
+
+import chex
+import jax
+import jax.numpy as jnp
+import mujoco
+from mujoco import mjx
+
+from hcp_jax.hardware.pool import MEAN_INERTIA, RobotPool
+from hcp_jax.physics.base import PhysicsState
+from hcp_jax.physics.native import MJ_INTEGRATORS
+
+# Fields of a pool that MJX does not read: bounding volume trees, lights, and what it cannot batch (STACK.md).
+_NOT_IN_MJX = (MEAN_INERTIA, "bvh_aabb", "light_poscom0", "dof_length", "dof_M0")
+# Bits of `Data.overflow` that are not a buffer of contacts or constraints (STACK.md).
+_HARMLESS_OVERFLOW = 512 | 1024
+
+
+def has_warp() -> bool:
+    """Whether `impl="warp"` can be used in this installation."""
+    try:
+        import warp  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+class MjxPhysics:
+    """`mjx.step` vmapped over worlds. A nested vmap over worlds gives wrong results with Warp: keep one flat axis."""
+
+    def __init__(
+        self,
+        pool: RobotPool,
+        sim_dt: float,
+        integrator: str,
+        impl: str,
+        max_contacts: int = 8,
+        max_constraints: int = 32,
+    ):
+        """Args:
+        pool: supplies the template model.
+        sim_dt: physics time step [s].
+        integrator: a key of `MJ_INTEGRATORS`.
+        impl: `warp` or `jax`.
+        max_contacts, max_constraints: Warp's buffer sizes per world (contacts are shared by all worlds).
+        """
+        if impl == "warp" and not has_warp():
+            raise ValueError("physics='mjx-warp': warp-lang is not installed; install mujoco-mjx[warp] or use mjx-jax")
+        self._impl = impl
+        self._mj_model = pool.template_model()
+        self._mj_model.opt.timestep = sim_dt
+        self._mj_model.opt.integrator = MJ_INTEGRATORS[integrator]
+        self._model = mjx.put_model(self._mj_model, impl=impl)
+        self._max_contacts = max_contacts
+        self._max_constraints = max_constraints
+
+    def step(
+        self, robots: RobotPool, state: PhysicsState, ctrl: chex.Array, num_substeps: int
+    ) -> tuple[PhysicsState, chex.Array]:
+        fields = {name: values for name, values in robots.fields.items() if name not in _NOT_IN_MJX}
+        model = self._model.tree_replace(fields)
+        axes = jax.tree.map(lambda _: None, self._model).tree_replace(dict.fromkeys(fields, 0))
+        step_world = functools.partial(self._step_world, num_worlds=ctrl.shape[0], num_substeps=num_substeps)
+        state, overflow = jax.vmap(step_world, in_axes=(axes, 0, 0))(model, state, ctrl)
+        return state, jnp.sum((overflow & ~_HARMLESS_OVERFLOW) != 0, dtype=jnp.int32)
+
+    def _step_world(self, model, state: PhysicsState, ctrl, *, num_worlds: int, num_substeps: int):
+        data = self._make_data(num_worlds)
+        data = data.replace(qpos=state.qpos, qvel=state.qvel, qacc_warmstart=state.qacc_warmstart, ctrl=ctrl)
+
+        def substep(carry, _):
+            data, overflow = carry
+            data = mjx.step(model, data)
+            return (data, overflow | self._overflow(data)), None
+
+        (data, overflow), _ = jax.lax.scan(substep, (data, jnp.int32(0)), None, length=num_substeps)
+        return PhysicsState(data.qpos, data.qvel, data.qacc_warmstart), overflow
+
+    def _make_data(self, num_worlds: int) -> mjx.Data:
+        if self._impl != "warp":
+            return mjx.make_data(self._mj_model, impl=self._impl)
+        return mjx.make_data(
+            self._mj_model, impl="warp", naconmax=self._max_contacts * num_worlds, njmax=self._max_constraints
+        )
+
+    def _overflow(self, data: mjx.Data) -> chex.Array:
+        # impl="jax" allocates every possible contact and constraint, so it has nothing to overflow.
+        return jnp.int32(data._impl.overflow) if self._impl == "warp" else jnp.int32(0)

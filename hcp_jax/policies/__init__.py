@@ -1,0 +1,1 @@
+"""Networks, action distribution and the sources of the hardware vector v_h."""

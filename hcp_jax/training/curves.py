@@ -1,0 +1,36 @@
+"""Learning curves as a picture."""
+
+import pathlib
+from collections.abc import Sequence
+
+import matplotlib
+import numpy as np
+
+from hcp_jax.training.metrics import METRICS_FILE, read_rows
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt  # noqa: E402
+
+_SERIES = {
+    "train_return_mean": "training robots",
+    "heldout_return_mean": "held-out robots",
+    "heldout_fitted_return_mean": "held-out robots, fitted v_h",
+}
+
+
+def plot_curves(folders: Sequence[pathlib.Path], path: pathlib.Path) -> None:
+    """Draws the evaluation returns of run folders over control steps into a PNG file."""
+    figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
+    for folder in folders:
+        rows = read_rows(folder / METRICS_FILE)
+        for column, label in _SERIES.items():
+            points = [(int(row["env_steps"]) / 1e6, float(row[column])) for row in rows if row.get(column)]
+            if points:
+                x, y = np.asarray(points).T
+                axes.plot(x, y, marker="o", markersize=3, label=f"{folder.name}: {label}" if len(folders) > 1 else label)
+    axes.set_xlabel("control steps [million]")
+    axes.set_ylabel("return of one episode")
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)

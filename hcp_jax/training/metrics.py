@@ -1,0 +1,64 @@
+"""Metrics of a run: `metrics.csv` with one row per evaluation, `timing.csv` beside it, and TensorBoard events.
+
+`metrics.csv` holds nothing that depends on the clock, so that an interrupted and resumed run writes the same bytes.
+"""
+
+import csv
+import os
+import pathlib
+
+import tensorboardX
+
+METRICS_FILE = "metrics.csv"
+TIMING_FILE = "timing.csv"
+
+
+class MetricsWriter:
+    """Appends rows; on resume it first drops the rows after the checkpoint."""
+
+    def __init__(self, folder: pathlib.Path, resume_env_steps: int = 0):
+        self._folder = folder
+        for name in (METRICS_FILE, TIMING_FILE):
+            rows = [row for row in read_rows(folder / name) if int(row["env_steps"]) <= resume_env_steps]
+            _write_rows(folder / name, rows)
+        self._events = tensorboardX.SummaryWriter(str(folder / "events"), purge_step=resume_env_steps + 1)
+
+    def write(self, metrics: dict[str, float], timing: dict[str, float]) -> None:
+        """Adds one evaluation. Both records start with `env_steps`."""
+        for name, record in ((METRICS_FILE, metrics), (TIMING_FILE, timing)):
+            row = {key: _format(value) for key, value in record.items()}
+            _write_rows(self._folder / name, [*read_rows(self._folder / name), row])
+        for key, value in (metrics | timing).items():
+            if key != "env_steps" and value is not None:
+                self._events.add_scalar(key, value, metrics["env_steps"])
+        self._events.flush()
+
+    def close(self) -> None:
+        self._events.close()
+
+
+def read_rows(path: pathlib.Path) -> list[dict[str, str]]:
+    """Rows of a CSV file; none if it does not exist."""
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def _write_rows(path: pathlib.Path, rows: list[dict[str, str]]) -> None:
+    """Replaces the file in one step, so that a kill leaves the old rows or the new ones."""
+    temporary = path.with_suffix(".tmp")
+    with temporary.open("w", newline="") as file:
+        if rows:
+            writer = csv.DictWriter(file, fieldnames=list(rows[-1]), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(path)
+
+
+def _format(value: float | int | None) -> str:
+    if value is None:
+        return ""
+    return str(value) if isinstance(value, int) else f"{value:.9g}"

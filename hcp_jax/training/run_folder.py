@@ -1,0 +1,103 @@
+"""The run folder: what is written at its start, and what is checked before anything is."""
+
+import importlib.metadata
+import json
+import os
+import pathlib
+import platform
+import subprocess
+import sys
+
+import jax
+
+from hcp_jax.config import Config, ConfigError, from_dict, to_dict
+
+CONFIG_FILE = "config.json"
+ENVIRONMENT_FILE = "environment.json"
+CHECKPOINT_FOLDER = "checkpoints"
+# Fields that a resumed run may change.
+_CHANGEABLE = {"total_env_steps", "keep_checkpoints"}
+_PACKAGES = ("jax", "jaxlib", "mujoco", "mujoco-mjx", "warp-lang", "brax", "flax", "optax", "orbax-checkpoint", "numpy")
+
+
+class RunFolderError(ValueError):
+    """The run folder exists, is missing, is empty or holds another run."""
+
+
+def check_new(folder: pathlib.Path) -> None:
+    """Raises RunFolderError if `folder` holds anything."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise RunFolderError(f"--out={folder}: already exists; choose another folder, or continue it with --resume")
+
+
+def check_resumable(folder: pathlib.Path, config: Config) -> None:
+    """Raises RunFolderError unless `folder` holds a run of this config (fields in `_CHANGEABLE` aside)."""
+    saved = read_config(folder)
+    old, new = _flatten(to_dict(saved)), _flatten(to_dict(config))
+    for name in new:
+        if name not in _CHANGEABLE and old[name] != new[name]:
+            raise RunFolderError(f"--resume: {folder} was started with {name}={old[name]!r}, not {new[name]!r}")
+
+
+def read_config(folder: pathlib.Path) -> Config:
+    """The config of a run folder. Raises RunFolderError if there is none, or none that can be read."""
+    path = folder / CONFIG_FILE
+    if not folder.is_dir():
+        raise RunFolderError(f"{folder}: no such run folder")
+    if not path.exists():
+        raise RunFolderError(f"{folder}: not a run folder (it has no {CONFIG_FILE})")
+    try:
+        return from_dict(Config, json.loads(path.read_text()))
+    except (json.JSONDecodeError, ConfigError) as error:
+        raise RunFolderError(f"{path}: damaged or of another version ({error})") from error
+
+
+def write_start(folder: pathlib.Path, config: Config, physics: str) -> None:
+    """Writes `config.json` and `environment.json`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / CONFIG_FILE).write_text(json.dumps(to_dict(config), indent=2) + "\n")
+    (folder / ENVIRONMENT_FILE).write_text(json.dumps(describe_environment(physics), indent=2) + "\n")
+
+
+def describe_environment(physics: str) -> dict:
+    """Versions, device and commit, for the record."""
+    versions = {}
+    for name in _PACKAGES:
+        try:
+            versions[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            versions[name] = None
+    return {
+        "commit": read_commit(),
+        "command": sys.argv,
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "cpu_cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "devices": [f"{device.platform}:{device.device_kind}" for device in jax.devices()],
+        "physics": physics,
+        "versions": versions,
+    }
+
+
+def read_commit() -> str | None:
+    """Commit of the checkout this package stands in, with `+` if it has local changes; None outside a checkout."""
+    root = pathlib.Path(__file__).resolve().parents[2]
+    if not (root / ".git").exists():
+        return None
+    try:
+        git = ["git", "-C", str(root)]
+        commit = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+        changes = subprocess.run([*git, "status", "--porcelain", "-uno"], capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return commit + ("+" if changes.stdout.strip() else "")
+
+
+def _flatten(values: dict, path: str = "") -> dict:
+    flat = {}
+    for name, value in values.items():
+        if isinstance(value, dict):
+            flat |= _flatten(value, f"{path}{name}.")
+        else:
+            flat[f"{path}{name}"] = list(value) if isinstance(value, tuple) else value
+    return flat

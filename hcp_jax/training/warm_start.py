@@ -1,0 +1,66 @@
+"""Starting a run from another run's hidden layers (paper, section 5.2: transfer to new agents)."""
+
+import pathlib
+from collections.abc import Callable
+
+import jax.numpy as jnp
+
+from hcp_jax.algorithms.ppo import PPOState
+from hcp_jax.config import Config
+from hcp_jax.training import run_folder
+from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
+from hcp_jax.experiment import Experiment, copy_tree, make_experiment
+
+
+def load_state(folder: pathlib.Path, run: Experiment, iteration: int | None = None) -> tuple[int, PPOState, list[str]]:
+    """The newest readable state of a run folder, or that of checkpoint `iteration`."""
+    checkpoint_folder = folder / run_folder.CHECKPOINT_FOLDER
+    if not checkpoint_folder.is_dir():
+        raise CheckpointError(f"{folder}: holds no checkpoint")
+    checkpoints = Checkpoints(checkpoint_folder, read_only=True)
+    try:
+        return checkpoints.restore(run.init_state(), iteration)
+    finally:
+        checkpoints.close()
+
+
+def load_init(config: Config) -> Callable[[Experiment, PPOState], PPOState]:
+    """Reads the run that `config.init` names; the result writes its hidden layers into a new run's state.
+
+    Hidden layers, observation statistics and the centre of the embedding carry over; output layers, the log standard
+    deviation and every robot's own v_h are new.
+
+    Raises:
+        RunFolderError, CheckpointError: that run cannot be read, or its hidden layers do not fit `config`.
+    """
+    folder = pathlib.Path(config.init)
+    source_config = run_folder.read_config(folder)
+    for field in ("encoding", "ppo.hidden_sizes", "embedding.size"):
+        old, new = _get(source_config, field), _get(config, field)
+        if old != new:
+            raise CheckpointError(f"init={config.init}: another architecture: its {field} is {old!r}, the config's {new!r}")
+    source = load_state(folder, make_experiment(source_config))[1]
+
+    def init(run: Experiment, state: PPOState) -> PPOState:
+        network = copy_tree(state.params["network"])
+        for part, layers in network["params"].items():
+            for layer in layers if isinstance(layers, dict) else ():
+                if layer.startswith("hidden") and part in source.params["network"]["params"]:
+                    layers[layer] = copy_tree(source.params["network"]["params"][part][layer])
+        embedding = state.params["embedding"]
+        if embedding is not None:
+            embedding = embedding + jnp.mean(source.params["embedding"], axis=0)
+        return state.replace(
+            params={"network": network, "embedding": embedding},
+            obs_statistics=copy_tree(source.obs_statistics),
+            delta_statistics=copy_tree(source.delta_statistics),
+        )
+
+    return init
+
+
+def _get(config: Config, path: str):
+    value = config
+    for name in path.split("."):
+        value = getattr(value, name)
+    return value
