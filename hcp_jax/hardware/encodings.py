@@ -54,6 +54,7 @@ def _random(pool: RobotPool) -> np.ndarray:
     width = sum(pool.hardware[name].shape[1] for name in ("link_length", *_DYNAMICS))
     rows = []
     for row in range(pool.num_robots):
-        digest = np.frombuffer(b"".join(np.ascontiguousarray(v[row]).tobytes() for v in pool.hardware.values()), np.uint32)
+        parts = [np.ascontiguousarray(pool.hardware[name][row]).tobytes() for name in sorted(pool.hardware)]
+        digest = np.frombuffer(b"".join(parts), np.uint32)
         rows.append(np.random.default_rng([_RANDOM_ENCODING_SEED, *digest]).uniform(size=width))
     return np.asarray(rows, np.float32)

@@ -40,7 +40,7 @@ class MjxPhysics:
         max_constraints: int = 32,
     ):
         """Args:
-        pool: supplies the template model.
+        pool: the robots that will be stepped.
         sim_dt: physics time step [s].
         integrator: a key of `MJ_INTEGRATORS`.
         impl: `warp` or `jax`.
@@ -52,6 +52,8 @@ class MjxPhysics:
         self._mj_model = pool.template_model()
         self._mj_model.opt.timestep = sim_dt
         self._mj_model.opt.integrator = MJ_INTEGRATORS[integrator]
+        # impl="jax" decides from the template which joints can have friction at all.
+        self._mj_model.dof_frictionloss[:] = pool.fields["dof_frictionloss"].max(axis=0)
         self._model = mjx.put_model(self._mj_model, impl=impl)
         self._max_contacts = max_contacts
         self._max_constraints = max_constraints
@@ -59,10 +61,15 @@ class MjxPhysics:
     def step(
         self, robots: RobotPool, state: PhysicsState, ctrl: chex.Array, num_substeps: int
     ) -> tuple[PhysicsState, chex.Array]:
-        fields = {name: values for name, values in robots.fields.items() if name not in _NOT_IN_MJX}
+        num_worlds = ctrl.shape[0]
+        fields = {
+            name: values.reshape(num_worlds, *getattr(self._model, name).shape)  # Warp splits boxes into two corners
+            for name, values in robots.fields.items()
+            if name not in _NOT_IN_MJX
+        }
         model = self._model.tree_replace(fields)
         axes = jax.tree.map(lambda _: None, self._model).tree_replace(dict.fromkeys(fields, 0))
-        step_world = functools.partial(self._step_world, num_worlds=ctrl.shape[0], num_substeps=num_substeps)
+        step_world = functools.partial(self._step_world, num_worlds=num_worlds, num_substeps=num_substeps)
         state, overflow = jax.vmap(step_world, in_axes=(axes, 0, 0))(model, state, ctrl)
         return state, jnp.sum((overflow & ~_HARMLESS_OVERFLOW) != 0, dtype=jnp.int32)
 

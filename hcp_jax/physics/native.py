@@ -15,6 +15,7 @@ from hcp_jax.physics.base import PhysicsState
 _WARNING = mujoco.mjtWarning
 _DIVERGED = [int(_WARNING.mjWARN_BADQPOS), int(_WARNING.mjWARN_BADQVEL), int(_WARNING.mjWARN_BADQACC)]
 _OVERFLOWED = [int(_WARNING.mjWARN_CONTACTFULL), int(_WARNING.mjWARN_CNSTRFULL)]
+_COUNT = 1  # of the two numbers per warning: last info, count
 MJ_INTEGRATORS = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
     "rk4": mujoco.mjtIntegrator.mjINT_RK4,
@@ -84,8 +85,8 @@ class _Worlds:
         batch.warning[:] = 0
         batch.step(nstep=num_substeps)
         qpos, qvel, warmstart = (np.asarray(a, np.float32) for a in (batch.qpos, batch.qvel, batch.qacc_warmstart))
-        diverged = batch.warning[:, _DIVERGED].any(axis=1)
+        diverged = batch.warning[:, _DIVERGED, _COUNT].any(axis=1)
         if diverged.any():
             qpos[diverged] = qvel[diverged] = warmstart[diverged] = np.nan
-        overflow = np.int32(batch.warning[:, _OVERFLOWED].any(axis=1).sum())
+        overflow = np.int32(batch.warning[:, _OVERFLOWED, _COUNT].any(axis=1).sum())
         return qpos, qvel, warmstart, overflow

@@ -27,6 +27,10 @@ class Encoding:
         """The encoding of the robots at positions `index` [...]: [..., K]."""
         return self._table[index]
 
+    def spread(self, embedding: None) -> chex.Array:
+        """Standard deviation of v_h over the pool: [K]."""
+        return self._table.std(axis=0)
+
 
 class Embedding:
     """v_h is row `index` of a learned table [num_robots, size] (paper, section 3.2: implicit encoding)."""
@@ -42,6 +46,10 @@ class Embedding:
     def v_h(self, embedding: chex.Array, index: chex.Array) -> chex.Array:
         """The embedding of the robots at positions `index` [...]: [..., size]."""
         return embedding[index]
+
+    def spread(self, embedding: chex.Array) -> chex.Array:
+        """Standard deviation of v_h over the pool: [size]."""
+        return jax.lax.stop_gradient(embedding).std(axis=0)
 
 
 Conditioning = Encoding | Embedding

@@ -36,7 +36,8 @@ class Checkpoints:
             read_only=read_only,
             create=not read_only,
         )
-        self._manager = ocp.CheckpointManager(self.folder, options=options)
+        handlers = {"state": ocp.StandardCheckpointHandler()}
+        self._manager = ocp.CheckpointManager(self.folder, options=options, item_handlers=handlers)
 
     def save(self, iteration: int, state: PPOState, metrics: dict[str, float] | None) -> None:
         """Starts writing in the background; the state's buffers may be donated as soon as this returns."""

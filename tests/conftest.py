@@ -1,0 +1,51 @@
+"""Pools, engines and rollouts that several test files use, built and compiled once per session."""
+
+import os
+import pathlib
+
+os.environ.setdefault("JAX_PLATFORMS", "cpu")
+
+import jax
+import numpy as np
+import pytest
+
+from hcp_jax import command_line
+from hcp_jax.config import Config, EmbeddingConfig, HopperConfig, PoolConfig, PPOConfig
+from hcp_jax.hardware.hopper import make_hopper_pool
+from hcp_jax.hardware.pool import RobotPool
+from hcp_jax.hardware.ranges import HopperRanges
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+command_line.enable_compilation_cache()
+
+
+@pytest.fixture(scope="session")
+def pool() -> RobotPool:
+    """64 training hoppers."""
+    return make_hopper_pool(HopperRanges(), 64, seed=0)
+
+
+@pytest.fixture(scope="session")
+def tiny_config() -> Config:
+    """HCP-I on 8 hoppers, small enough to train in seconds."""
+    return Config(
+        name="tiny",
+        encoding="embedding",
+        total_env_steps=512,
+        eval_every=128,
+        eval_robots=4,
+        pool=PoolConfig(num_robots=8, num_heldout=4),
+        env=HopperConfig(episode_length=24, integrator="euler"),
+        ppo=PPOConfig(unroll_length=8, num_minibatches=2, num_epochs=2, hidden_sizes=(8, 8), normalize_observation=True),
+        embedding=EmbeddingConfig(size=3, fit_steps=64),
+    )
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+@pytest.fixture
+def key() -> jax.Array:
+    return jax.random.key(0)
