@@ -1,0 +1,167 @@
+import dataclasses
+import importlib.util
+import pathlib
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from hcp_jax.algorithms.ppo import PPO, clipped_surrogate, clipped_value_loss
+from hcp_jax.config import EmbeddingConfig, PPOConfig
+from hcp_jax.policies.conditioning import Embedding
+
+_spec = importlib.util.spec_from_file_location("probe_envs", pathlib.Path(__file__).with_name("probe_envs.py"))
+probe_envs = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(probe_envs)
+ProbeEnv = probe_envs.ProbeEnv
+
+NUM_ENVS = 16
+CONFIG = PPOConfig(
+    unroll_length=16,
+    num_epochs=4,
+    num_minibatches=4,
+    learning_rate=5e-3,
+    final_learning_rate=5e-3,
+    gamma=0.5,
+    entropy_cost=0.0,
+    value_clip_eps=0.0,
+    hidden_sizes=(16, 16),
+)
+EMBEDDING = EmbeddingConfig(size=2, initial_scale=0.05, learning_rate=1e-2)
+
+
+class NoHardware:
+    """v_h of length 0 for any robot."""
+
+    is_learned = False
+    size = 0
+
+    def init(self, key):
+        return None
+
+    def v_h(self, embedding, index):
+        return jnp.zeros((*index.shape, 0))
+
+    def spread(self, embedding):
+        return jnp.zeros(0)
+
+
+def learn(env, conditioning=None, iterations=60, seed=0, config=CONFIG, embedding=EMBEDDING):
+    ppo = PPO(env, conditioning or NoHardware(), config, embedding, NUM_ENVS, iterations)
+    return ppo, ppo.train(ppo.init(jax.random.key(seed)), iterations)
+
+
+def value_at(ppo, state, step: int) -> float:
+    obs = jnp.asarray([[1.0, float(step)]])
+    return float(ppo.network.apply(state.params["network"], obs, jnp.zeros((1, ppo.conditioning.size)), method="value")[0])
+
+
+def mean_action(ppo, state, step: int, robot: int = 0) -> float:
+    v_h = ppo.conditioning.v_h(state.params["embedding"], jnp.asarray([robot]))
+    obs = jnp.asarray([[1.0, float(step)]])
+    return float(ppo.mean_action(state.params["network"], state.obs_statistics, obs, v_h)[0, 0])
+
+
+def test_the_value_of_a_one_step_episode_is_its_reward():
+    ppo, state = learn(ProbeEnv(1, lambda index, step, first, action: jnp.ones(index.shape)))
+    assert value_at(ppo, state, 0) == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_reward_one_step_away_is_discounted_once():
+    ppo, state = learn(ProbeEnv(2, lambda index, step, first, action: (step == 1) * 1.0))
+    assert value_at(ppo, state, 1) == pytest.approx(1.0, abs=0.1)
+    assert value_at(ppo, state, 0) == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_truncated_episode_is_worth_as_much_as_an_endless_one():
+    """Reward 1 for ever at gamma 0.5 is worth 2, though no episode is longer than 2 steps; its steps look alike."""
+    env = ProbeEnv(2, lambda index, step, first, action: jnp.ones(index.shape), truncates=True)
+    env._observe = lambda step: jnp.ones((*step.shape, 2))
+    ppo, state = learn(env, iterations=80)
+    assert value_at(ppo, state, 1) == pytest.approx(2.0, abs=0.15)
+
+
+def test_an_action_gets_the_credit_for_the_next_steps_reward():
+    ppo, state = learn(ProbeEnv(2, lambda index, step, first, action: (step == 1) * -jnp.square(first - 0.6)))
+    assert mean_action(ppo, state, 0) == pytest.approx(0.6, abs=0.15)
+
+
+def opposite_actions(index, step, first, action):
+    return jnp.where(index == 0, action, -action)
+
+
+def test_two_robots_that_need_opposite_actions_are_solved_with_an_embedding():
+    ppo, state = learn(ProbeEnv(1, opposite_actions), Embedding(2, 2, 0.05))
+    assert mean_action(ppo, state, 0, robot=0) > 0.8
+    assert mean_action(ppo, state, 0, robot=1) < -0.8
+
+
+def test_two_robots_that_need_opposite_actions_are_not_solved_without_v_h():
+    ppo, state = learn(ProbeEnv(1, opposite_actions))
+    action = mean_action(ppo, state, 0)
+    assert opposite_actions(jnp.asarray([0, 1]), 0, 0, action).mean() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_frozen_network_still_learns_the_embedding_of_new_robots():
+    ppo, state = learn(ProbeEnv(1, opposite_actions), Embedding(2, 2, 0.05))
+    network = jax.tree.map(np.asarray, state.params["network"])
+    swapped = ProbeEnv(1, lambda index, *args: opposite_actions(1 - index, *args))
+    learner = PPO(swapped, Embedding(2, 2, 0.05), CONFIG, EMBEDDING, NUM_ENVS, 60, train_network=False)
+    start = learner.init(jax.random.key(1))
+    start = start.replace(params={"network": jax.tree.map(jnp.copy, state.params["network"]), "embedding": jnp.zeros((2, 2))})
+    fitted = learner.train(start, 60)
+    jax.tree.map(np.testing.assert_array_equal, network, fitted.params["network"])
+    assert mean_action(learner, fitted, 0, robot=0) < -0.5
+    assert mean_action(learner, fitted, 0, robot=1) > 0.5
+
+
+@pytest.mark.parametrize("source", ["policy", "prediction"])
+def test_the_embedding_learns_from_the_losses_it_is_asked_to(source):
+    embedding = dataclasses.replace(EMBEDDING, prediction_cost=1.0, policy_gradient=False)
+    if source == "policy":
+        embedding = EMBEDDING
+    env = ProbeEnv(1, opposite_actions)
+    ppo = PPO(env, Embedding(2, 2, 0.05), CONFIG, embedding, NUM_ENVS, 5)
+    before = ppo.init(jax.random.key(0))
+    table = np.asarray(before.params["embedding"])
+    after = ppo.train(before, 5)
+    assert np.abs(np.asarray(after.params["embedding"]) - table).max() > 1e-3
+    assert (float(after.sums["prediction_loss"]) > 0) is (source == "prediction")
+
+
+def test_the_same_seed_gives_the_same_parameters_and_another_seed_others():
+    env = ProbeEnv(2, opposite_actions)
+    one, same, other = (learn(env, iterations=3, seed=seed)[1].params["network"] for seed in (0, 0, 1))
+    jax.tree.map(np.testing.assert_array_equal, one, same)
+    with pytest.raises(AssertionError):
+        jax.tree.map(np.testing.assert_array_equal, one, other)
+
+
+def test_training_in_two_calls_equals_training_in_one():
+    env = ProbeEnv(2, opposite_actions)
+    ppo = PPO(env, Embedding(2, 2, 0.05), CONFIG, EMBEDDING, NUM_ENVS, 6)
+    whole = ppo.train(ppo.init(jax.random.key(0)), 6)
+    parts = ppo.train(ppo.train(ppo.init(jax.random.key(0)), 2), 4)
+    jax.tree.map(np.testing.assert_array_equal, whole.params, parts.params)
+
+
+def test_the_learner_compiles_once_whatever_the_number_of_iterations():
+    ppo = PPO(ProbeEnv(1, opposite_actions), NoHardware(), CONFIG, EMBEDDING, NUM_ENVS, 6)
+    state = ppo.init(jax.random.key(0))
+    for count in (1, 2, 3):
+        state = ppo.train(state, count)
+    assert ppo.train._cache_size() == 1
+
+
+def test_the_surrogate_stops_rewarding_ratios_outside_the_clip_range():
+    advantage = jnp.asarray([1.0, 1.0, -1.0, -1.0])
+    ratio = jnp.asarray([1.1, 1.5, 0.9, 0.5])
+    expected = -np.mean([1.1, 1.2, -0.9, -0.8])
+    np.testing.assert_allclose(clipped_surrogate(jnp.log(ratio), advantage, 0.2), expected, rtol=1e-6)
+
+
+def test_a_clipped_value_is_charged_the_larger_error():
+    value, old, target = jnp.asarray([1.0]), jnp.asarray([0.0]), jnp.asarray([1.0])
+    np.testing.assert_allclose(clipped_value_loss(value, old, target, 0.2), 0.5 * 0.8**2, rtol=1e-5)
+    np.testing.assert_allclose(clipped_value_loss(value, old, target, 0.0), 0.0, atol=1e-7)

@@ -1,0 +1,166 @@
+"""Bad input: one line, exit code 2, nothing written."""
+
+import dataclasses
+import json
+import pathlib
+import shutil
+
+import pytest
+
+from hcp_jax import command_line, evaluate, train
+from hcp_jax.config import Config, ConfigError, field_names, from_dict, to_dict
+from hcp_jax.training import loop
+
+EXPERIMENTS = pathlib.Path(__file__).resolve().parents[1] / "experiments"
+HOPPER = str(EXPERIMENTS / "hopper_ppo.py")
+
+
+@pytest.mark.parametrize("path", sorted(EXPERIMENTS.glob("*.py")), ids=lambda path: path.stem)
+def test_every_experiment_builds_and_survives_json(path):
+    text = path.read_text()
+    configs = command_line.load_configs(str(path)) if "def get_configs" in text else [command_line.load_config(str(path))]
+    for config in configs:
+        assert from_dict(Config, json.loads(json.dumps(to_dict(config)))) == config
+
+
+def test_overrides_are_typed_and_reach_nested_fields():
+    config = command_line.load_config(
+        HOPPER, ["--config.seed=3", "--config.ppo.learning_rate=1e-4", "--config.pool.ranges.damping=(0.5,1.5)"]
+    )
+    assert (config.seed, config.ppo.learning_rate, config.pool.ranges.damping) == (3, 1e-4, (0.5, 1.5))
+
+
+def test_overrides_leave_the_original_alone():
+    config = command_line.load_config(HOPPER)
+    command_line.apply_overrides(config, ["--config.seed=9"])
+    assert config.seed == 0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        config.seed = 1
+
+
+def experiment(folder: pathlib.Path, body: str) -> str:
+    path = folder / "experiment.py"
+    path.write_text(body)
+    return str(path)
+
+
+BAD_ARGUMENTS = {
+    "unknown config file": (["--config", "nowhere.py"], "nowhere.py: no such file"),
+    "no config": ([], "--config"),
+    "unknown field": (["--config", HOPPER, "--config.ppo.learning_rat=1"], "did you mean --config.ppo.learning_rate"),
+    "unknown argument": (["--config", HOPPER, "--lr=1"], "--lr=1: unknown argument"),
+    "stray word": (["--config", HOPPER, "fast"], "fast: unexpected argument"),
+    "wrong type": (["--config", HOPPER, "--config.ppo.learning_rate=fast"], "fast"),
+    "float for int": (["--config", HOPPER, "--config.seed=1.5"], "1.5"),
+    "batch that does not divide": (["--config", HOPPER, "--config.ppo.num_minibatches=7"], "ppo.num_minibatches=7: must divide"),
+    "negative range": (["--config", HOPPER, "--config.pool.ranges.damping=(-1.0,2.0)"], "ranges.damping=(-1.0, 2.0)"),
+    "reversed range": (["--config", HOPPER, "--config.pool.ranges.armature=(2.0,1.0)"], "low is above high"),
+    "unknown encoding": (["--config", HOPPER, "--config.encoding=colour"], "encoding='colour': expected one of none"),
+    "unknown physics": (["--config", HOPPER, "--config.physics=bullet"], "physics='bullet': expected one of auto"),
+    "no robots": (["--config", HOPPER, "--config.pool.num_robots=0"], "pool.num_robots=0: expected at least 1"),
+    "missing init": (["--config", HOPPER, "--config.init=nowhere"], "nowhere: no such run folder"),
+    "resume of nothing": (["--config", HOPPER, "--resume"], "no such run folder"),
+}
+
+
+def fails(capsys, function, arguments) -> str:
+    """Runs a command that must end with code 2 and one line; returns the line."""
+    with pytest.raises(SystemExit) as exit_info:
+        function(arguments)
+    assert exit_info.value.code == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1, error
+    return error
+
+
+@pytest.mark.parametrize("name", BAD_ARGUMENTS)
+def test_bad_arguments_give_one_line_and_write_nothing(name, tmp_path, capsys, monkeypatch):
+    arguments, expected = BAD_ARGUMENTS[name]
+    monkeypatch.chdir(tmp_path)
+    assert expected in fails(capsys, train.main, [*arguments, "--out", str(tmp_path / "run")])
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        ("def get_config(): raise RuntimeError('boom')", "raised RuntimeError: boom"),
+        ("import nonexistent_module", "raised ModuleNotFoundError"),
+        ("x = 1", "defines get_config()"),
+        ("def get_config(): return 3", "gave int, expected Config"),
+        ("def broken(:", "raised SyntaxError"),
+    ],
+)
+def test_a_config_file_that_fails_says_how(body, expected, tmp_path, capsys):
+    path = experiment(tmp_path, body)
+    assert expected in fails(capsys, train.main, ["--config", path, "--out", str(tmp_path / "run")])
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.fixture(scope="module")
+def finished_run(tiny_config, tmp_path_factory) -> pathlib.Path:
+    folder = tmp_path_factory.mktemp("runs") / "tiny"
+    loop.train(tiny_config, folder)
+    return folder
+
+
+def tiny_experiment(folder: pathlib.Path, config: Config) -> str:
+    return experiment(
+        folder, f"from hcp_jax.config import Config, from_dict\ndef get_config():\n    return from_dict(Config, {to_dict(config)!r})\n"
+    )
+
+
+def test_a_run_never_overwrites_another(finished_run, tiny_config, tmp_path, capsys):
+    before = (finished_run / "metrics.csv").read_bytes()
+    path = tiny_experiment(tmp_path, tiny_config)
+    assert "already exists" in fails(capsys, train.main, ["--config", path, "--out", str(finished_run)])
+    assert (finished_run / "metrics.csv").read_bytes() == before
+
+
+def test_resuming_with_another_setting_names_it(finished_run, tiny_config, tmp_path, capsys):
+    path = tiny_experiment(tmp_path, tiny_config)
+    line = fails(capsys, train.main, ["--config", path, "--out", str(finished_run), "--resume", "--config.seed=4"])
+    assert "seed=0, not 4" in line
+
+
+def test_resuming_an_empty_folder_is_refused(tiny_config, tmp_path, capsys):
+    (tmp_path / "run").mkdir()
+    path = tiny_experiment(tmp_path, tiny_config)
+    assert "not a run folder" in fails(capsys, train.main, ["--config", path, "--out", str(tmp_path / "run"), "--resume"])
+    assert list((tmp_path / "run").iterdir()) == []
+
+
+def test_a_checkpoint_of_another_architecture_is_refused(finished_run, tiny_config, tmp_path, capsys):
+    other = shutil.copytree(finished_run, tmp_path / "other")
+    config = json.loads((other / "config.json").read_text())
+    config["ppo"]["hidden_sizes"] = [16, 16]
+    (other / "config.json").write_text(json.dumps(config))
+    assert "another architecture" in fails(capsys, evaluate.main, [str(other), "--trials", "1", "--robots-per-trial", "2"])
+    path = tiny_experiment(tmp_path, tiny_config)
+    arguments = ["--config", path, "--out", str(tmp_path / "new"), f"--config.init={finished_run}"]
+    assert "another architecture" in fails(capsys, train.main, [*arguments, "--config.ppo.hidden_sizes=(16,16)"])
+    assert not (tmp_path / "new").exists()
+
+
+def test_evaluate_refuses_what_is_not_a_run_and_impossible_counts(finished_run, tmp_path, capsys):
+    assert "no such run folder" in fails(capsys, evaluate.main, [str(tmp_path / "nowhere")])
+    assert "--trials=0: expected at least 1" in fails(capsys, evaluate.main, [str(finished_run), "--trials", "0"])
+    assert "expected hopper" in fails(capsys, evaluate.main, [str(finished_run), "--types", "H"])
+    assert "--physics" in fails(capsys, evaluate.main, [str(finished_run), "--physics", "bullet"])
+
+
+def test_evaluate_writes_the_promised_record(finished_run, tmp_path, capsys):
+    path = tmp_path / "record.json"
+    evaluate.main([str(finished_run), "--trials", "2", "--robots-per-trial", "3", "--physics", "native-rk4", "--json", str(path)])
+    record = json.loads(path.read_text())
+    assert {"run", "task", "algorithm", "encoding", "physics", "trials", "robots_per_trial", "types", "return_mean"} <= set(record)
+    assert record["integrator"] == "rk4"
+    assert set(record["sets"]) == {"train", "heldout", "heldout_fitted"}
+    assert len(record["robots"]) == 3 * 2 * 3
+    assert "heldout_fitted" in capsys.readouterr().out
+
+
+def test_field_names_are_those_of_the_json_file():
+    assert "ppo.learning_rate" in field_names(Config)
+    with pytest.raises(ConfigError, match="expected a list of float"):
+        from_dict(Config, {"name": "x", "pool": {"ranges": {"damping": 3.0}}})

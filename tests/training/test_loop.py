@@ -1,0 +1,118 @@
+import csv
+import dataclasses
+import json
+import pathlib
+import shutil
+
+import jax
+import numpy as np
+import pytest
+
+from hcp_jax.experiment import make_experiment
+from hcp_jax.training import loop
+from hcp_jax.training.checkpoint import Checkpoints
+from hcp_jax.training.loop import Interrupt, TrainingLoop
+from hcp_jax.training.warm_start import load_init, load_state
+
+
+@pytest.fixture(scope="module")
+def finished(tiny_config, tmp_path_factory) -> pathlib.Path:
+    folder = tmp_path_factory.mktemp("runs") / "tiny"
+    loop.train(tiny_config, folder)
+    return folder
+
+
+def metrics(folder: pathlib.Path) -> list[dict]:
+    with (folder / "metrics.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_run_folder_holds_what_the_design_promises(finished):
+    names = {path.name for path in finished.iterdir()}
+    assert {"config.json", "environment.json", "metrics.csv", "timing.csv", "checkpoints", "events", "curves.png"} <= names
+    environment = json.loads((finished / "environment.json").read_text())
+    assert environment["physics"] == "native"
+    assert environment["versions"]["jax"] == jax.__version__
+    assert (finished / "curves.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_there_is_one_row_per_evaluation_and_the_last_has_fitted_embeddings(finished):
+    rows = metrics(finished)
+    assert [int(row["env_steps"]) for row in rows] == [128, 256, 384, 512]
+    assert [bool(row["heldout_fitted_return_mean"]) for row in rows] == [False, False, False, True]
+
+
+def test_the_newest_checkpoints_and_the_best_are_kept(finished, tiny_config):
+    rows = metrics(finished)
+    best = 2 * (1 + int(np.argmax([float(row["train_return_mean"]) for row in rows])))
+    checkpoints = Checkpoints(finished / "checkpoints", read_only=True)
+    assert set(checkpoints.iterations()) == {4, 6, 8, best}
+    assert checkpoints.best() == best
+
+
+@pytest.mark.parametrize("cut", [2, 3, 5])
+def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished, tiny_config, tmp_path, cut):
+    """Cut after `cut` of 8 iterations: between two evaluations and at one."""
+    folder = tmp_path / "run"
+    run = make_experiment(tiny_config)
+    interrupt = Interrupt()
+    checkpoints = Checkpoints(folder / "checkpoints")
+    loop.run_folder.write_start(folder, tiny_config, run.physics)
+    training = TrainingLoop(run, folder, checkpoints, 0)
+    training._chunk = 1
+    train_step = run.ppo.train
+
+    def train_and_interrupt(state, count):
+        interrupt.requested = training._iteration + count >= cut
+        return train_step(state, count)
+
+    run.ppo.train = train_and_interrupt
+    assert training.run(run.init_state(), interrupt) is None
+    loop.train(tiny_config, folder, resume=True)
+    assert (folder / "metrics.csv").read_bytes() == (finished / "metrics.csv").read_bytes()
+
+
+def test_rows_written_after_the_last_checkpoint_are_dropped_on_resume(finished, tiny_config, tmp_path):
+    folder = shutil.copytree(finished, tmp_path / "run")
+    shutil.rmtree(folder / "checkpoints" / "8")
+    loop.train(tiny_config, folder, resume=True)
+    assert (folder / "metrics.csv").read_bytes() == (finished / "metrics.csv").read_bytes()
+
+
+@pytest.mark.parametrize("damage", ["truncated", "emptied"])
+def test_a_damaged_checkpoint_is_passed_over_with_a_line(finished, tiny_config, tmp_path, capsys, damage):
+    folder = shutil.copytree(finished, tmp_path / "run")
+    for path in (folder / "checkpoints" / "8").rglob("*"):
+        if path.is_file():
+            path.write_bytes(path.read_bytes()[: path.stat().st_size // 2] if damage == "truncated" else b"")
+    loop.train(tiny_config, folder, resume=True)
+    assert "checkpoint 8 cannot be read and is passed over" in capsys.readouterr().out
+    assert (folder / "metrics.csv").read_bytes() == (finished / "metrics.csv").read_bytes()
+
+
+def test_a_longer_run_may_continue_a_shorter_one(finished, tiny_config, tmp_path):
+    folder = shutil.copytree(finished, tmp_path / "run")
+    loop.train(dataclasses.replace(tiny_config, total_env_steps=640), folder, resume=True)
+    assert [int(row["env_steps"]) for row in metrics(folder)] == [128, 256, 384, 512, 640]
+
+
+def test_heldout_robots_do_not_depend_on_the_training_seed(tiny_config):
+    one, other = (make_experiment(dataclasses.replace(tiny_config, seed=seed)) for seed in (0, 1))
+    jax.tree.map(np.testing.assert_array_equal, one.heldout_pool, other.heldout_pool)
+    jax.tree.map(np.testing.assert_array_equal, one.train_pool, other.train_pool)
+
+
+def test_a_warm_start_takes_hidden_layers_and_leaves_output_layers_and_embeddings_new(finished, tiny_config):
+    config = dataclasses.replace(tiny_config, init=str(finished), pool=dataclasses.replace(tiny_config.pool, split="new"))
+    run = make_experiment(config)
+    fresh = run.init_state()
+    state = load_init(config)(run, run.init_state())
+    source = load_state(finished, run)[1]
+    policy, source_policy = (s.params["network"]["params"]["policy"] for s in (state, source))
+    fresh_policy = fresh.params["network"]["params"]["policy"]
+    np.testing.assert_array_equal(policy["hidden_1"]["kernel"], source_policy["hidden_1"]["kernel"])
+    np.testing.assert_array_equal(policy["output"]["kernel"], fresh_policy["output"]["kernel"])
+    assert not np.array_equal(state.params["embedding"], source.params["embedding"])
+    np.testing.assert_allclose(
+        state.params["embedding"] - fresh.params["embedding"], np.tile(source.params["embedding"].mean(axis=0), (8, 1)), atol=1e-6
+    )
