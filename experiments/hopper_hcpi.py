@@ -1,8 +1,8 @@
-"""HCP-I on 1000 hoppers: v_h is learned with the policy (paper, section 3.2). Preset: fast."""
+"""HCP-I on 1000 hoppers: v_h is learned (paper, section 3.2), here by predicting the robot's motion. Preset: fast."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.hopper("hopper_hcpi", encoding="embedding")
+    return presets.hopper("hopper_hcpi", encoding="embedding", ppo=presets.GROUNDED_PPO, embedding=presets.GROUNDED_EMBEDDING)

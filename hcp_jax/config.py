@@ -124,7 +124,10 @@ class PPOConfig:
         for name in ("gamma", "gae_lambda"):
             _require(0.0 <= getattr(self, name) <= 1.0, f"ppo.{name}", getattr(self, name), "a number in [0, 1]")
         _require(
-            len(self.hidden_sizes) >= 1 and min(self.hidden_sizes) >= 1, "ppo.hidden_sizes", self.hidden_sizes, "sizes of at least 1"
+            len(self.hidden_sizes) >= 1 and min(self.hidden_sizes) >= 1,
+            "ppo.hidden_sizes",
+            self.hidden_sizes,
+            "sizes of at least 1",
         )
 
 

@@ -21,6 +21,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--fit-steps", type=int, help="control steps for fitting v_h of new robots (HCP-I); 0 skips it")
     parser.add_argument("--types", nargs="*", help="robot types to evaluate (the hopper has one: hopper)")
     parser.add_argument("--seed", type=int, default=0, help="seed of the initial states")
+    parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
     parser.add_argument("--json", type=pathlib.Path, help="file to write the whole record to")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
@@ -31,7 +32,13 @@ def main(arguments: list[str] | None = None) -> None:
             raise ConfigError(f"--types={' '.join(options.types)}: expected hopper")
         command_line.enable_compilation_cache()
         record = evaluate_folder(
-            options.run, options.trials, options.robots_per_trial, options.physics, options.fit_steps, options.seed
+            options.run,
+            options.trials,
+            options.robots_per_trial,
+            options.physics,
+            options.fit_steps,
+            options.seed,
+            options.best,
         )
     print_table(record)
     if options.json:

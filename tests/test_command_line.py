@@ -52,7 +52,10 @@ BAD_ARGUMENTS = {
     "stray word": (["--config", HOPPER, "fast"], "fast: unexpected argument"),
     "wrong type": (["--config", HOPPER, "--config.ppo.learning_rate=fast"], "fast"),
     "float for int": (["--config", HOPPER, "--config.seed=1.5"], "1.5"),
-    "batch that does not divide": (["--config", HOPPER, "--config.ppo.num_minibatches=7"], "ppo.num_minibatches=7: must divide"),
+    "batch that does not divide": (
+        ["--config", HOPPER, "--config.ppo.num_minibatches=7"],
+        "ppo.num_minibatches=7: must divide",
+    ),
     "negative range": (["--config", HOPPER, "--config.pool.ranges.damping=(-1.0,2.0)"], "ranges.damping=(-1.0, 2.0)"),
     "reversed range": (["--config", HOPPER, "--config.pool.ranges.armature=(2.0,1.0)"], "low is above high"),
     "unknown encoding": (["--config", HOPPER, "--config.encoding=colour"], "encoding='colour': expected one of none"),
@@ -106,7 +109,8 @@ def finished_run(tiny_config, tmp_path_factory) -> pathlib.Path:
 
 def tiny_experiment(folder: pathlib.Path, config: Config) -> str:
     return experiment(
-        folder, f"from hcp_jax.config import Config, from_dict\ndef get_config():\n    return from_dict(Config, {to_dict(config)!r})\n"
+        folder,
+        f"from hcp_jax.config import Config, from_dict\ndef get_config():\n    return from_dict(Config, {to_dict(config)!r})\n",
     )
 
 
@@ -151,9 +155,13 @@ def test_evaluate_refuses_what_is_not_a_run_and_impossible_counts(finished_run, 
 
 def test_evaluate_writes_the_promised_record(finished_run, tmp_path, capsys):
     path = tmp_path / "record.json"
-    evaluate.main([str(finished_run), "--trials", "2", "--robots-per-trial", "3", "--physics", "native-rk4", "--json", str(path)])
+    evaluate.main(
+        [str(finished_run), "--trials", "2", "--robots-per-trial", "3", "--physics", "native-rk4", "--json", str(path)]
+    )
     record = json.loads(path.read_text())
-    assert {"run", "task", "algorithm", "encoding", "physics", "trials", "robots_per_trial", "types", "return_mean"} <= set(record)
+    assert {"run", "task", "algorithm", "encoding", "physics", "trials", "robots_per_trial", "types", "return_mean"} <= set(
+        record
+    )
     assert record["integrator"] == "rk4"
     assert set(record["sets"]) == {"train", "heldout", "heldout_fitted"}
     assert len(record["robots"]) == 3 * 2 * 3

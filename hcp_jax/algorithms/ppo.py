@@ -238,7 +238,8 @@ class PPO:
             "value_error": jnp.mean(jnp.square(target - value)),
             "target_variance": jnp.var(target),
         }
-        return jax.tree.map(lambda x: x.reshape((-1,) + x.shape[2:]), batch), sums
+        num_samples = self.num_envs * config.unroll_length
+        return jax.tree.map(lambda x: x.reshape((num_samples,) + x.shape[2:]), batch), sums
 
     def _update(self, state: PPOState, batch: Batch, key: chex.PRNGKey):
         num_samples = batch.obs.shape[0]

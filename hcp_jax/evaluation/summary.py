@@ -11,7 +11,13 @@ from hcp_jax.config import Config
 from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE, read_rows
 from hcp_jax.training.run_folder import ENVIRONMENT_FILE, read_config
 
-ALGORITHM_NAMES = {"none": "PPO", "kinematics": "HCP-E", "kinematics+dynamics": "HCP-E+Dyn", "embedding": "HCP-I", "random": "PPO+random"}
+ALGORITHM_NAMES = {
+    "none": "PPO",
+    "kinematics": "HCP-E",
+    "kinematics+dynamics": "HCP-E+Dyn",
+    "embedding": "HCP-I",
+    "random": "PPO+random",
+}
 RETURNS = ("train_return", "heldout_return", "heldout_fitted_return")
 
 

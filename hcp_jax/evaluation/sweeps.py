@@ -21,8 +21,9 @@ def evaluate_folder(
     physics: str = "auto",
     fit_steps: int | None = None,
     seed: int = 0,
+    best: bool = False,
 ) -> dict:
-    """Evaluates the newest checkpoint of a run folder.
+    """Evaluates the newest checkpoint of a run folder, or its best one.
 
     Training robots are taken in order, all of them before any twice; new robots are held-out robots
     0..trials*robots_per_trial-1, one episode each. Where v_h is learned, new robots get the mean embedding (`heldout`)
@@ -34,6 +35,7 @@ def evaluate_folder(
         physics: engine, may be `native-INTEGRATOR`.
         fit_steps: control steps for fitting; None takes the config's.
         seed: seed of the episodes' initial states.
+        best: take the checkpoint with the highest return on training robots.
 
     Returns:
         The record that `evaluate --json` writes (DESIGN.md, "The command line").
@@ -43,9 +45,7 @@ def evaluate_folder(
     """
     config = run_folder.read_config(folder)
     run = make_experiment(config, physics)
-    iteration, state, skipped = load_state(folder, run)
-    for line in skipped:
-        print(line, flush=True)
+    iteration, state = load_state(folder, run, best)
     count = trials * robots_per_trial
     heldout = make_heldout_pool(config.pool, count)
     index = np.arange(count) % run.train_pool.num_robots

@@ -88,9 +88,7 @@ class MjxPhysics:
     def _make_data(self, num_worlds: int) -> mjx.Data:
         if self._impl != "warp":
             return mjx.make_data(self._mj_model, impl=self._impl)
-        return mjx.make_data(
-            self._mj_model, impl="warp", naconmax=self._max_contacts * num_worlds, njmax=self._max_constraints
-        )
+        return mjx.make_data(self._mj_model, impl="warp", naconmax=self._max_contacts * num_worlds, njmax=self._max_constraints)
 
     def _overflow(self, data: mjx.Data) -> chex.Array:
         # impl="jax" allocates every possible contact and constraint, so it has nothing to overflow.

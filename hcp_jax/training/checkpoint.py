@@ -6,11 +6,8 @@ import pathlib
 import jax
 import orbax.checkpoint as ocp
 from absl import logging as absl_logging
-from orbax.checkpoint import checkpoint_managers
 
 from hcp_jax.algorithms.ppo import PPOState
-
-METRIC = "train_return_mean"
 
 
 class CheckpointError(RuntimeError):
@@ -18,49 +15,52 @@ class CheckpointError(RuntimeError):
 
 
 class Checkpoints:
-    """The `checkpoints/` folder of a run. A checkpoint's step is its number of iterations."""
+    """The `checkpoints/` folder of a run: `newest/` and `best/`, each with a folder per number of iterations."""
 
     def __init__(self, folder: str | pathlib.Path, keep: int = 3, read_only: bool = False):
-        absl_logging.set_verbosity(absl_logging.ERROR)
+        absl_logging.set_verbosity(absl_logging.FATAL)
         logging.getLogger("orbax").setLevel(logging.ERROR)
         self.folder = pathlib.Path(folder).absolute()
-        policies = [
-            checkpoint_managers.LatestN(keep),
-            checkpoint_managers.BestN(
-                get_metric_fn=lambda metrics: metrics[METRIC], n=1, keep_checkpoints_without_metrics=False
-            ),
-        ]
-        options = ocp.CheckpointManagerOptions(
-            preservation_policy=checkpoint_managers.AnyPreservationPolicy(policies),
-            best_fn=lambda metrics: metrics[METRIC],
-            read_only=read_only,
-            create=not read_only,
-        )
-        handlers = {"state": ocp.StandardCheckpointHandler()}
-        self._manager = ocp.CheckpointManager(self.folder, options=options, item_handlers=handlers)
+        self._read_only = read_only
+        self._newest = self._make_manager("newest", keep)
+        self._best = self._make_manager("best", 1)
 
-    def save(self, iteration: int, state: PPOState, metrics: dict[str, float] | None) -> None:
+    def _make_manager(self, name: str, keep: int) -> ocp.CheckpointManager:
+        options = ocp.CheckpointManagerOptions(max_to_keep=keep, read_only=self._read_only, create=not self._read_only)
+        handlers = {"state": ocp.StandardCheckpointHandler()}
+        return ocp.CheckpointManager(self.folder / name, options=options, item_handlers=handlers)
+
+    def save(self, iteration: int, state: PPOState, is_best: bool = False) -> None:
         """Starts writing in the background; the state's buffers may be donated as soon as this returns."""
-        if iteration in self._manager.all_steps():
-            return
-        metrics = None if metrics is None else {METRIC: float(metrics[METRIC])}
-        self._manager.save(iteration, args=ocp.args.Composite(state=ocp.args.StandardSave(state)), metrics=metrics)
+        for manager in (self._newest, self._best) if is_best else (self._newest,):
+            if iteration not in manager.all_steps():
+                manager.save(iteration, args=ocp.args.Composite(state=ocp.args.StandardSave(state)))
 
     def wait(self) -> None:
         """Blocks until everything is on disk; raises what went wrong in the background."""
-        self._manager.wait_until_finished()
+        self._newest.wait_until_finished()
+        self._best.wait_until_finished()
 
     def close(self) -> None:
-        self._manager.close()
+        self._newest.close()
+        self._best.close()
 
     def iterations(self) -> list[int]:
-        return sorted(self._manager.all_steps())
+        """The newest checkpoints, oldest first."""
+        return sorted(self._newest.all_steps())
 
     def best(self) -> int | None:
-        return self._manager.best_step()
+        return self._best.latest_step()
 
-    def restore(self, template: PPOState, iteration: int | None = None) -> tuple[int, PPOState, list[str]]:
-        """Reads checkpoint `iteration`, or the newest one that can be read.
+    def restore_best(self, template: PPOState) -> tuple[int, PPOState]:
+        """The checkpoint with the highest return on training robots. Raises CheckpointError if there is none."""
+        iteration = self.best()
+        if iteration is None:
+            raise CheckpointError(f"{self.folder}: holds no best checkpoint")
+        return iteration, self._read_checked(self._best, template, iteration)
+
+    def restore(self, template: PPOState) -> tuple[int, PPOState, list[str]]:
+        """Reads the newest checkpoint that can be read. Damaged ones are moved aside, unless this is read-only.
 
         Returns:
             its iteration, its state, and a line for each newer checkpoint that was damaged.
@@ -68,28 +68,39 @@ class Checkpoints:
         Raises:
             CheckpointError: there is none, none can be read, or it is of another architecture.
         """
-        candidates = [iteration] if iteration is not None else self.iterations()[::-1]
-        if not candidates:
+        if not self.iterations():
             raise CheckpointError(f"{self.folder}: holds no checkpoint")
         skipped = []
-        for candidate in candidates:
+        for iteration in self.iterations()[::-1]:
             try:
-                self._check_architecture(template, candidate)
-                return candidate, self._read(template, candidate), skipped
+                return iteration, self._read_checked(self._newest, template, iteration), skipped
             except CheckpointError:
                 raise
             except Exception as error:  # orbax and tensorstore raise many kinds for damaged files
-                reason = str(error).strip().splitlines()[0][:160] if str(error).strip() else type(error).__name__
-                skipped.append(f"checkpoint {candidate} cannot be read and is passed over ({reason})")
+                reason = " ".join(str(error).split())[:160] or type(error).__name__
+                skipped.append(f"checkpoint {iteration} cannot be read and is passed over ({reason})")
+                self._move_aside(iteration)
         raise CheckpointError(f"{self.folder}: no readable checkpoint; {skipped[0]}")
 
-    def _read(self, template: PPOState, iteration: int) -> PPOState:
+    def _move_aside(self, iteration: int) -> None:
+        if not self._read_only:
+            aside = self.folder / "damaged" / str(iteration)
+            aside.parent.mkdir(exist_ok=True)
+            if not aside.exists():
+                (self.folder / "newest" / str(iteration)).rename(aside)
+            self._newest.reload()
+
+    def _read_checked(self, manager: ocp.CheckpointManager, template: PPOState, iteration: int) -> PPOState:
+        self._check_architecture(manager, template, iteration)
+        return self._read(manager, template, iteration)
+
+    def _read(self, manager: ocp.CheckpointManager, template: PPOState, iteration: int) -> PPOState:
         abstract = jax.tree.map(ocp.utils.to_shape_dtype_struct, template)
-        restored = self._manager.restore(iteration, args=ocp.args.Composite(state=ocp.args.StandardRestore(abstract)))
+        restored = manager.restore(iteration, args=ocp.args.Composite(state=ocp.args.StandardRestore(abstract)))
         return restored.state
 
-    def _check_architecture(self, template: PPOState, iteration: int) -> None:
-        metadata = self._manager.item_metadata(iteration).state
+    def _check_architecture(self, manager: ocp.CheckpointManager, template: PPOState, iteration: int) -> None:
+        metadata = manager.item_metadata(iteration).state
         saved = {_name(path): tuple(leaf.shape) for path, leaf in jax.tree_util.tree_leaves_with_path(metadata.tree)
                  if hasattr(leaf, "shape")}  # fmt: skip
         for path, leaf in jax.tree_util.tree_leaves_with_path(template.params):

@@ -30,6 +30,8 @@ from hcp_jax.training.warm_start import load_init
 
 # Control steps between two progress lines: a few seconds of work.
 _CHUNK_ENV_STEPS = 250_000
+# The best checkpoint is the one with the highest of this: held-out robots choose nothing.
+_BEST = "train_return_mean"
 
 
 @dataclasses.dataclass
@@ -140,7 +142,8 @@ class TrainingLoop:
             "steps_per_second": self._progress.steps_per_second(self._env_steps),
         }
         state = state.replace(sums=zero_sums())
-        self._checkpoints.save(self._iteration, state, metrics)
+        is_best = metrics[_BEST] >= max((float(row[_BEST]) for row in self._metrics.rows()), default=-math.inf)
+        self._checkpoints.save(self._iteration, state, is_best)
         self._metrics.write(metrics, timing)
         line = f"return {metrics['train_return_mean']:.0f} on training robots, {metrics['heldout_return_mean']:.0f} held out"
         if fitted is not None:
@@ -157,7 +160,7 @@ class TrainingLoop:
             self._progress.say(f"physics diverged in {diverged.sum()} episodes so far; robots (episodes): {worst}")
 
     def _save_and_stop(self, state: PPOState) -> None:
-        self._checkpoints.save(self._iteration, state, None)
+        self._checkpoints.save(self._iteration, state)
         self._checkpoints.wait()
         self._metrics.close()
         self._progress.say(f"interrupted at {self._env_steps:,} steps; saved. Continue with --resume --out {self._folder}")

@@ -33,6 +33,10 @@ class MetricsWriter:
                 self._events.add_scalar(key, value, metrics["env_steps"])
         self._events.flush()
 
+    def rows(self) -> list[dict[str, str]]:
+        """The evaluations so far."""
+        return read_rows(self._folder / METRICS_FILE)
+
     def close(self) -> None:
         self._events.close()
 

@@ -12,14 +12,19 @@ from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
 from hcp_jax.experiment import Experiment, copy_tree, make_experiment
 
 
-def load_state(folder: pathlib.Path, run: Experiment, iteration: int | None = None) -> tuple[int, PPOState, list[str]]:
-    """The newest readable state of a run folder, or that of checkpoint `iteration`."""
+def load_state(folder: pathlib.Path, run: Experiment, best: bool = False) -> tuple[int, PPOState]:
+    """The newest readable state of a run folder, or its best one, and its number of iterations."""
     checkpoint_folder = folder / run_folder.CHECKPOINT_FOLDER
     if not checkpoint_folder.is_dir():
         raise CheckpointError(f"{folder}: holds no checkpoint")
     checkpoints = Checkpoints(checkpoint_folder, read_only=True)
     try:
-        return checkpoints.restore(run.init_state(), iteration)
+        if best:
+            return checkpoints.restore_best(run.init_state())
+        iteration, state, skipped = checkpoints.restore(run.init_state())
+        for line in skipped:
+            print(line, flush=True)
+        return iteration, state
     finally:
         checkpoints.close()
 

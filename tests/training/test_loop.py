@@ -46,7 +46,7 @@ def test_the_newest_checkpoints_and_the_best_are_kept(finished, tiny_config):
     rows = metrics(finished)
     best = 2 * (1 + int(np.argmax([float(row["train_return_mean"]) for row in rows])))
     checkpoints = Checkpoints(finished / "checkpoints", read_only=True)
-    assert set(checkpoints.iterations()) == {4, 6, 8, best}
+    assert checkpoints.iterations() == [4, 6, 8]
     assert checkpoints.best() == best
 
 
@@ -74,7 +74,7 @@ def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished, t
 
 def test_rows_written_after_the_last_checkpoint_are_dropped_on_resume(finished, tiny_config, tmp_path):
     folder = shutil.copytree(finished, tmp_path / "run")
-    shutil.rmtree(folder / "checkpoints" / "8")
+    shutil.rmtree(folder / "checkpoints" / "newest" / "8")
     loop.train(tiny_config, folder, resume=True)
     assert (folder / "metrics.csv").read_bytes() == (finished / "metrics.csv").read_bytes()
 
@@ -82,7 +82,7 @@ def test_rows_written_after_the_last_checkpoint_are_dropped_on_resume(finished, 
 @pytest.mark.parametrize("damage", ["truncated", "emptied"])
 def test_a_damaged_checkpoint_is_passed_over_with_a_line(finished, tiny_config, tmp_path, capsys, damage):
     folder = shutil.copytree(finished, tmp_path / "run")
-    for path in (folder / "checkpoints" / "8").rglob("*"):
+    for path in (folder / "checkpoints" / "newest" / "8").rglob("*"):
         if path.is_file():
             path.write_bytes(path.read_bytes()[: path.stat().st_size // 2] if damage == "truncated" else b"")
     loop.train(tiny_config, folder, resume=True)
@@ -114,5 +114,7 @@ def test_a_warm_start_takes_hidden_layers_and_leaves_output_layers_and_embedding
     np.testing.assert_array_equal(policy["output"]["kernel"], fresh_policy["output"]["kernel"])
     assert not np.array_equal(state.params["embedding"], source.params["embedding"])
     np.testing.assert_allclose(
-        state.params["embedding"] - fresh.params["embedding"], np.tile(source.params["embedding"].mean(axis=0), (8, 1)), atol=1e-6
+        state.params["embedding"] - fresh.params["embedding"],
+        np.tile(source.params["embedding"].mean(axis=0), (8, 1)),
+        atol=1e-6,
     )
