@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Callable
 
-import chex
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,8 +10,8 @@ import numpy as np
 from hcp_jax.algorithms.ppo import PPO, Params, PPOState
 from hcp_jax.config import Config, PoolConfig
 from hcp_jax.envs.base import PoolEnv
-from hcp_jax.envs.hopper import Hopper
 from hcp_jax.envs.episodes import Episodes, Evaluator
+from hcp_jax.envs.hopper import Hopper
 from hcp_jax.hardware.encodings import encode
 from hcp_jax.hardware.hopper import make_hopper_pool
 from hcp_jax.hardware.pool import RobotPool, concatenate_pools
@@ -96,12 +95,12 @@ def make_conditioning(config: Config, train_pool: RobotPool) -> Conditioning:
     return Encoding(train_pool, config.encoding, train_pool)
 
 
-def train_v_h(run: Experiment, params: Params) -> chex.Array:
+def train_v_h(run: Experiment, params: Params) -> jax.Array:
     """v_h of every training robot: [N, K]."""
     return run.ppo.conditioning.v_h(params["embedding"], jnp.arange(run.train_pool.num_robots))
 
 
-def heldout_v_h(run: Experiment, params: Params, pool: RobotPool | None = None) -> chex.Array:
+def heldout_v_h(run: Experiment, params: Params, pool: RobotPool | None = None) -> jax.Array:
     """v_h of every robot of `pool`, by default the held-out one: [M, K].
 
     It is the robot's encoding or, where v_h is learned and so unknown, the mean over the training robots.
@@ -112,7 +111,7 @@ def heldout_v_h(run: Experiment, params: Params, pool: RobotPool | None = None) 
     return jnp.asarray(encode(pool, run.config.encoding, run.train_pool))
 
 
-def evaluate_run(run: Experiment, state: PPOState, heldout: chex.Array | None = None) -> tuple[Episodes, Episodes]:
+def evaluate_run(run: Experiment, state: PPOState, heldout: jax.Array | None = None) -> tuple[Episodes, Episodes]:
     """One deterministic episode of each evaluated robot: those trained on, and held-out ones with v_h `heldout` [M, K]."""
     count = run.num_evaluated
     heldout = heldout_v_h(run, state.params) if heldout is None else heldout
@@ -122,7 +121,7 @@ def evaluate_run(run: Experiment, state: PPOState, heldout: chex.Array | None = 
     return episodes.take(slice(0, count)), episodes.take(slice(count, None))
 
 
-def fit_embedding(run: Experiment, state: PPOState, pool: RobotPool, env_steps: int) -> chex.Array:
+def fit_embedding(run: Experiment, state: PPOState, pool: RobotPool, env_steps: int) -> jax.Array:
     """Learns v_h of new robots from their experience, with the networks frozen (paper, section 5.2, made honest).
 
     Starts from the mean embedding of the training robots and runs the training's own objective for `env_steps` control

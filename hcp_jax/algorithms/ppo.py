@@ -8,9 +8,8 @@ train(state, n):                         one jitted call, buffers donated
                                          networks and embedding have their own step sizes
 """
 
-from typing import Protocol
+from typing import Any, Protocol
 
-import chex
 import jax
 import jax.numpy as jnp
 import optax
@@ -24,7 +23,7 @@ from hcp_jax.policies.conditioning import Conditioning
 from hcp_jax.policies.distribution import gaussian_entropy, gaussian_log_prob, sample_gaussian
 from hcp_jax.policies.networks import ActorCritic
 
-Params = dict  # {"network": ..., "embedding": [N, K] or None}
+Params = dict[str, Any]  # {"network": ..., "embedding": [N, K] or None}
 
 
 class Env(Protocol):
@@ -34,25 +33,25 @@ class Env(Protocol):
     action_size: int
     num_robots: int
 
-    def initial_index(self, key: chex.PRNGKey, num_envs: int) -> chex.Array: ...
-    def reset(self, key: chex.PRNGKey, index: chex.Array) -> EnvState: ...
-    def step(self, state: EnvState, action: chex.Array) -> tuple[EnvState, Transition]: ...
+    def initial_index(self, key: jax.Array, num_envs: int) -> jax.Array: ...
+    def reset(self, key: jax.Array, index: jax.Array) -> EnvState: ...
+    def step(self, state: EnvState, action: jax.Array) -> tuple[EnvState, Transition]: ...
 
 
 @struct.dataclass
 class Batch:
     """Flattened samples of one iteration; every leaf has leading axis [T * B]."""
 
-    obs: chex.Array
-    next_obs: chex.Array
-    action: chex.Array
-    executed_action: chex.Array
-    log_prob: chex.Array
-    value: chex.Array
-    advantage: chex.Array
-    target: chex.Array
-    index: chex.Array
-    noise: chex.Array
+    obs: jax.Array
+    next_obs: jax.Array
+    action: jax.Array
+    executed_action: jax.Array
+    log_prob: jax.Array
+    value: jax.Array
+    advantage: jax.Array
+    target: jax.Array
+    index: jax.Array
+    noise: jax.Array
 
 
 @struct.dataclass
@@ -63,22 +62,22 @@ class PPOState:
     sums: running sums of metrics since they were last read.
     """
 
-    params: Params
+    params: Any
     opt_state: optax.OptState
     obs_statistics: running_statistics.RunningStatisticsState
     delta_statistics: running_statistics.RunningStatisticsState
     env_state: EnvState
-    key: chex.PRNGKey
-    diverged: chex.Array
-    overflow: chex.Array
-    sums: dict[str, chex.Array]
+    key: jax.Array
+    diverged: jax.Array
+    overflow: jax.Array
+    sums: dict[str, jax.Array]
 
 
 LOSS_METRICS = ("policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "prediction_loss")
 SUMS = (*LOSS_METRICS, "iterations", "episodes", "episode_return", "episode_length", "value_error", "target_variance")
 
 
-def zero_sums() -> dict[str, chex.Array]:
+def zero_sums() -> dict[str, jax.Array]:
     return {name: jnp.zeros(()) for name in SUMS}
 
 
@@ -127,13 +126,13 @@ class PPO:
             {"network": "network", "embedding": "embedding"},
         )
 
-    def init_params(self, key: chex.PRNGKey) -> Params:
+    def init_params(self, key: jax.Array) -> Params:
         key_network, key_embedding = jax.random.split(key)
         obs, action = jnp.zeros((1, self.env.observation_size)), jnp.zeros((1, self.env.action_size))
         network = self.network.init(key_network, obs, action, jnp.zeros((1, self.conditioning.size)))
         return {"network": network, "embedding": self.conditioning.init(key_embedding)}
 
-    def init(self, key: chex.PRNGKey) -> PPOState:
+    def init(self, key: jax.Array) -> PPOState:
         """The state before the first iteration."""
         key, key_params, key_index, key_env = jax.random.split(key, 4)
         params = self.init_params(key_params)
@@ -150,17 +149,20 @@ class PPO:
             sums=zero_sums(),
         )
 
-    def normalize(self, obs: chex.Array, statistics: running_statistics.RunningStatisticsState) -> chex.Array:
+    def _apply(self, network: dict, *inputs: jax.Array, method: str) -> Any:
+        return self.network.apply(network, *inputs, method=method)
+
+    def normalize(self, obs: jax.Array, statistics: running_statistics.RunningStatisticsState) -> jax.Array:
         """The observation as the networks see it."""
         if not self.config.normalize_observation:
             return obs
         return running_statistics.normalize(obs, statistics, max_abs_value=10.0)
 
-    def mean_action(self, network: dict, statistics, obs: chex.Array, v_h: chex.Array) -> chex.Array:
+    def mean_action(self, network: dict, statistics, obs: jax.Array, v_h: jax.Array) -> jax.Array:
         """The deterministic policy: obs [B, O], v_h [B, K] -> action [B, A]."""
-        return self.network.apply(network, self.normalize(obs, statistics), v_h, method="act")[0]
+        return self._apply(network, self.normalize(obs, statistics), v_h, method="act")[0]
 
-    def _train(self, state: PPOState, num_iterations: chex.Array) -> PPOState:
+    def _train(self, state: PPOState, num_iterations: jax.Array) -> PPOState:
         return jax.lax.fori_loop(0, num_iterations, lambda _, s: self._train_iteration(s), state)
 
     def _train_iteration(self, state: PPOState) -> PPOState:
@@ -182,10 +184,10 @@ class PPO:
             sums={name: state.sums[name] + sums[name] for name in SUMS},
         )
 
-    def _update_statistics(self, statistics: running_statistics.RunningStatisticsState, rows: chex.Array):
+    def _update_statistics(self, statistics: running_statistics.RunningStatisticsState, rows: jax.Array):
         return running_statistics.update(statistics, rows) if self._train_network else statistics
 
-    def _collect(self, state: PPOState, key: chex.PRNGKey):
+    def _collect(self, state: PPOState, key: jax.Array):
         """Rolls the current policy out: transitions, log_prob, sampled action, noise on v_h, each [T, B, ...]."""
         noise_scale = self.config.v_h_noise * self.conditioning.spread(state.params["embedding"])
 
@@ -194,7 +196,7 @@ class PPO:
             noise = noise_scale * jax.random.normal(key_noise, (self.num_envs, self.conditioning.size))
             v_h = self.conditioning.v_h(state.params["embedding"], env_state.index) + noise
             obs = self.normalize(env_state.obs, state.obs_statistics)
-            mean, log_std = self.network.apply(state.params["network"], obs, v_h, method="act")
+            mean, log_std = self._apply(state.params["network"], obs, v_h, method="act")
             action = sample_gaussian(mean, log_std, key_action)
             log_prob = gaussian_log_prob(mean, log_std, action)
             env_state, transition = self.env.step(env_state, action)
@@ -207,8 +209,8 @@ class PPO:
         v_h = self.conditioning.v_h(state.params["embedding"], transitions.index) + noise
         obs = self.normalize(transitions.obs, state.obs_statistics)
         next_obs = self.normalize(transitions.next_obs, state.obs_statistics)
-        value = self.network.apply(state.params["network"], obs, v_h, method="value")
-        next_value = self.network.apply(state.params["network"], next_obs, v_h, method="value")
+        value = self._apply(state.params["network"], obs, v_h, method="value")
+        next_value = self._apply(state.params["network"], next_obs, v_h, method="value")
         advantage, target = compute_gae(
             transitions.reward * config.reward_scale,
             value,
@@ -239,9 +241,9 @@ class PPO:
             "target_variance": jnp.var(target),
         }
         num_samples = self.num_envs * config.unroll_length
-        return jax.tree.map(lambda x: x.reshape((num_samples,) + x.shape[2:]), batch), sums
+        return jax.tree.map(lambda x: x.reshape(num_samples, *x.shape[2:]), batch), sums
 
-    def _update(self, state: PPOState, batch: Batch, key: chex.PRNGKey):
+    def _update(self, state: PPOState, batch: Batch, key: jax.Array):
         num_samples = batch.obs.shape[0]
 
         def minibatch_step(carry, rows):
@@ -259,13 +261,13 @@ class PPO:
         (params, opt_state), metrics = jax.lax.scan(epoch, (state.params, state.opt_state), keys)
         return params, opt_state, metrics
 
-    def _loss(self, params: Params, batch: Batch, state: PPOState) -> tuple[chex.Array, dict]:
+    def _loss(self, params: Params, batch: Batch, state: PPOState) -> tuple[jax.Array, dict]:
         config = self.config
         v_h = self.conditioning.v_h(params["embedding"], batch.index)
         policy_v_h = (v_h if self.embedding.policy_gradient else jax.lax.stop_gradient(v_h)) + batch.noise
         obs = self.normalize(batch.obs, state.obs_statistics)
-        mean, log_std = self.network.apply(params["network"], obs, policy_v_h, method="act")
-        value = self.network.apply(params["network"], obs, policy_v_h, method="value")
+        mean, log_std = self._apply(params["network"], obs, policy_v_h, method="act")
+        value = self._apply(params["network"], obs, policy_v_h, method="value")
         log_ratio = gaussian_log_prob(mean, log_std, batch.action) - batch.log_prob
         policy_loss = clipped_surrogate(log_ratio, batch.advantage, config.clip_eps)
         value_loss = clipped_value_loss(value, batch.value, batch.target, config.value_clip_eps)
@@ -285,22 +287,22 @@ class PPO:
         }
         return loss, metrics
 
-    def _prediction_loss(self, params: Params, batch: Batch, obs, v_h, state: PPOState) -> chex.Array:
+    def _prediction_loss(self, params: Params, batch: Batch, obs, v_h, state: PPOState) -> jax.Array:
         """Mean absolute error of the predicted change of the observation, robust to the kicks of contacts."""
         statistics = state.delta_statistics
         change = running_statistics.normalize(batch.next_obs - batch.obs, statistics, max_abs_value=5.0)
-        predicted = self.network.apply(params["network"], obs, batch.executed_action, v_h, method="predict")
+        predicted = self._apply(params["network"], obs, batch.executed_action, v_h, method="predict")
         return jnp.mean(optax.huber_loss(predicted, change, delta=1.0))
 
 
-def clipped_surrogate(log_ratio: chex.Array, advantage: chex.Array, clip_eps: float) -> chex.Array:
+def clipped_surrogate(log_ratio: jax.Array, advantage: jax.Array, clip_eps: float) -> jax.Array:
     """Negative clipped surrogate objective (Schulman et al. 2017, eq. 7), averaged: []."""
     ratio = jnp.exp(log_ratio)
     clipped = jnp.clip(ratio, 1.0 - clip_eps, 1.0 + clip_eps)
     return -jnp.mean(jnp.minimum(ratio * advantage, clipped * advantage))
 
 
-def clipped_value_loss(value: chex.Array, old_value: chex.Array, target: chex.Array, clip_eps: float) -> chex.Array:
+def clipped_value_loss(value: jax.Array, old_value: jax.Array, target: jax.Array, clip_eps: float) -> jax.Array:
     """Half the mean squared error, the larger of plain and clipped; `clip_eps` 0 does not clip: []."""
     loss = jnp.square(value - target)
     if clip_eps > 0:

@@ -6,14 +6,14 @@ import jax.numpy as jnp
 
 
 def compute_gae(
-    reward: chex.Array,
-    value: chex.Array,
-    next_value: chex.Array,
-    terminated: chex.Array,
-    truncated: chex.Array,
+    reward: jax.Array,
+    value: jax.Array,
+    next_value: jax.Array,
+    terminated: jax.Array,
+    truncated: jax.Array,
     gamma: float,
     gae_lambda: float,
-) -> tuple[chex.Array, chex.Array]:
+) -> tuple[jax.Array, jax.Array]:
     """Generalised advantage estimation (Schulman et al. 2016, eq. 16) over [T, B] arrays.
 
     delta_t = r_t + gamma (1 - terminated_t) V(s'_t) - V(s_t), where s'_t is the state that step t led to, before any reset;

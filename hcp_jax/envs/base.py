@@ -24,11 +24,11 @@ class EnvState:
     """State of B worlds: physics; index: [B] int32 position in the pool; obs: [B, O]; step_count: [B]; episode_return: [B]."""
 
     physics: PhysicsState
-    index: chex.Array
-    obs: chex.Array
-    step_count: chex.Array
-    episode_return: chex.Array
-    key: chex.PRNGKey
+    index: jax.Array
+    obs: jax.Array
+    step_count: jax.Array
+    episode_return: jax.Array
+    key: jax.Array
 
 
 @struct.dataclass
@@ -39,37 +39,40 @@ class Transition:
     that acted; episode_return, episode_length: [B], including this step; overflow: [] int32.
     """
 
-    obs: chex.Array
-    action: chex.Array
-    reward: chex.Array
-    next_obs: chex.Array
-    terminated: chex.Array
-    truncated: chex.Array
-    index: chex.Array
-    episode_return: chex.Array
-    episode_length: chex.Array
-    diverged: chex.Array
-    overflow: chex.Array
+    obs: jax.Array
+    action: jax.Array
+    reward: jax.Array
+    next_obs: jax.Array
+    terminated: jax.Array
+    truncated: jax.Array
+    index: jax.Array
+    episode_return: jax.Array
+    episode_length: jax.Array
+    diverged: jax.Array
+    overflow: jax.Array
 
     @property
-    def done(self) -> chex.Array:
+    def done(self) -> jax.Array:
         return self.terminated | self.truncated
 
 
 class Task(Protocol):
     """What the robots are asked to do. Arrays have a leading world axis B."""
 
-    observation_size: int
-    action_size: int
-    ctrl_dt: float
-    sim_dt: float
-    num_substeps: int
-    episode_length: int
-
-    def sample_initial(self, robots: RobotPool, key: chex.PRNGKey) -> PhysicsState: ...
-    def observe(self, physics: PhysicsState) -> chex.Array: ...
-    def reward(self, before: PhysicsState, action: chex.Array, after: PhysicsState) -> chex.Array: ...
-    def is_terminated(self, physics: PhysicsState) -> chex.Array: ...
+    @property
+    def observation_size(self) -> int: ...
+    @property
+    def action_size(self) -> int: ...
+    @property
+    def sim_dt(self) -> float: ...
+    @property
+    def num_substeps(self) -> int: ...
+    @property
+    def episode_length(self) -> int: ...
+    def sample_initial(self, robots: RobotPool, key: jax.Array) -> PhysicsState: ...
+    def observe(self, physics: PhysicsState) -> jax.Array: ...
+    def reward(self, before: PhysicsState, action: jax.Array, after: PhysicsState) -> jax.Array: ...
+    def is_terminated(self, physics: PhysicsState) -> jax.Array: ...
 
 
 class PoolEnv:
@@ -81,7 +84,7 @@ class PoolEnv:
         self.num_robots = pool.num_robots
         self.episode_length = task.episode_length
 
-    def reset(self, key: chex.PRNGKey, index: chex.Array) -> EnvState:
+    def reset(self, key: jax.Array, index: jax.Array) -> EnvState:
         """Starts an episode of the robots at positions `index` [B]."""
         key, key_initial = jax.random.split(key)
         physics = self.task.sample_initial(self.pool.take(index), key_initial)
@@ -95,14 +98,14 @@ class PoolEnv:
             key=key,
         )
 
-    def initial_index(self, key: chex.PRNGKey, num_envs: int) -> chex.Array:
+    def initial_index(self, key: jax.Array, num_envs: int) -> jax.Array:
         """Robots of the first episodes: whole permutations of the pool, so that every robot is there as often."""
         repeats = -(-num_envs // self.num_robots)
         keys = jax.random.split(key, repeats)
         rows = jax.vmap(lambda k: jax.random.permutation(k, self.num_robots))(keys)
         return rows.reshape(-1)[:num_envs].astype(jnp.int32)
 
-    def step(self, state: EnvState, action: chex.Array) -> tuple[EnvState, Transition]:
+    def step(self, state: EnvState, action: jax.Array) -> tuple[EnvState, Transition]:
         """One control step of every world; ended episodes restart with another robot."""
         state, transition = self.step_without_reset(state, action)
         key, key_robot, key_reset = jax.random.split(state.key, 3)
@@ -121,7 +124,7 @@ class PoolEnv:
             transition,
         )
 
-    def step_without_reset(self, state: EnvState, action: chex.Array) -> tuple[EnvState, Transition]:
+    def step_without_reset(self, state: EnvState, action: jax.Array) -> tuple[EnvState, Transition]:
         """One control step that leaves ended episodes where they ended. Actions are clipped to [-1, 1]."""
         chex.assert_shape(action, (state.index.shape[0], self.action_size))
         action = jnp.clip(action, -1.0, 1.0)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-import chex
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,18 +11,18 @@ from hcp_jax.envs.base import PoolEnv
 from hcp_jax.physics.base import PhysicsOverflowError
 
 # (obs [B, O], v_h [B, K]) -> action [B, A], of given policy parameters.
-PolicyFn = Callable[..., chex.Array]
+PolicyFn = Callable[..., jax.Array]
 
 
 @struct.dataclass
 class Episodes:
     """One episode of each robot. index, episode_return, episode_length, diverged: [B]; overflow: []."""
 
-    index: chex.Array
-    episode_return: chex.Array
-    episode_length: chex.Array
-    diverged: chex.Array
-    overflow: chex.Array
+    index: jax.Array
+    episode_return: jax.Array
+    episode_length: jax.Array
+    diverged: jax.Array
+    overflow: jax.Array
 
     def take(self, rows: slice | np.ndarray) -> "Episodes":
         """The episodes at `rows`."""
@@ -43,7 +42,7 @@ class Evaluator:
         self.env, self._policy = env, policy
         self._play = jax.jit(self._play_episodes)
 
-    def __call__(self, params, v_h: chex.Array, index: np.ndarray, key: chex.PRNGKey) -> Episodes:
+    def __call__(self, params, v_h: jax.Array, index: np.ndarray, key: jax.Array) -> Episodes:
         """Plays one episode of the robots at positions `index` [B] with hardware vectors v_h [B, K].
 
         Raises:

@@ -2,7 +2,6 @@
 
 import dataclasses
 
-import chex
 import jax
 import jax.numpy as jnp
 
@@ -36,22 +35,22 @@ class Hopper:
     num_substeps: int = dataclasses.field(default=NUM_SUBSTEPS, init=False)
     ctrl_dt: float = dataclasses.field(default=SIM_DT * NUM_SUBSTEPS, init=False)
 
-    def sample_initial(self, robots: RobotPool, key: chex.PRNGKey) -> PhysicsState:
+    def sample_initial(self, robots: RobotPool, key: jax.Array) -> PhysicsState:
         """The initial stand plus uniform noise in +-0.005 on every position and velocity."""
         noise = jax.random.uniform(key, (robots.num_robots, 12), minval=-INITIAL_NOISE, maxval=INITIAL_NOISE)
         stand = jnp.zeros(6).at[1].set(INITIAL_HEIGHT)
         return PhysicsState(qpos=stand + noise[:, :6], qvel=noise[:, 6:], qacc_warmstart=jnp.zeros_like(noise[:, 6:]))
 
-    def observe(self, physics: PhysicsState) -> chex.Array:
+    def observe(self, physics: PhysicsState) -> jax.Array:
         velocity = jnp.clip(physics.qvel, -MAX_OBSERVED_VELOCITY, MAX_OBSERVED_VELOCITY)
         return jnp.concatenate([physics.qpos[:, 1:], velocity], axis=-1)
 
-    def reward(self, before: PhysicsState, action: chex.Array, after: PhysicsState) -> chex.Array:
+    def reward(self, before: PhysicsState, action: jax.Array, after: PhysicsState) -> jax.Array:
         """Forward velocity [m/s] + 1 - 1e-3 |action|^2."""
         velocity = (after.qpos[:, 0] - before.qpos[:, 0]) / self.ctrl_dt
         return velocity + ALIVE_BONUS - ACTION_COST * jnp.sum(jnp.square(action), axis=-1)
 
-    def is_terminated(self, physics: PhysicsState) -> chex.Array:
+    def is_terminated(self, physics: PhysicsState) -> jax.Array:
         """Fallen: |state[2:]| >= 100, displaced height <= 0.7 or |pitch| >= 0.2 (state = qpos then qvel)."""
         state = jnp.concatenate([physics.qpos, physics.qvel], axis=-1)
         return (

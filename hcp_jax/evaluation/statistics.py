@@ -1,6 +1,7 @@
 """What an evaluation says: statistics over trials, per robot type and per robot."""
 
 import json
+import pathlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -37,7 +38,7 @@ def robot_rows(pool: RobotPool, trials: Sequence[Episodes]) -> list[dict]:
     return rows
 
 
-def write_json(path, record: dict) -> None:
+def write_json(path: pathlib.Path, record: dict | list) -> None:
     """Writes one record, indented, with numbers that JSON has."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")

@@ -52,9 +52,23 @@ def _summarise_group(name: str, env_steps: int, runs: list[tuple[Config, pathlib
         row[f"{key}_std"] = round(float(np.std(values)), 1) if values else None
     seconds = [float(read_rows(folder / TIMING_FILE)[-1]["seconds"]) for _, folder, _ in runs]
     row["wall_seconds"] = round(float(np.mean(seconds)), 1)
-    row["commit"] = sorted({_commit(folder) for _, folder, _ in runs})
+    row["commit"] = sorted({read_run_commit(folder) for _, folder, _ in runs})
     return row
 
 
-def _commit(folder: pathlib.Path) -> str:
+def read_run_commit(folder: pathlib.Path) -> str:
+    """The commit that a run was started from."""
     return json.loads((folder / ENVIRONMENT_FILE).read_text())["commit"] or "unknown"
+
+
+def read_curve(folder: pathlib.Path, column: str) -> np.ndarray:
+    """Control steps and `column` of each evaluation of a run: [E, 2]."""
+    rows = read_rows(folder / METRICS_FILE)
+    return np.asarray([(int(row["env_steps"]), float(row[column])) for row in rows if row.get(column)])
+
+
+def steps_to_reach(folder: pathlib.Path, column: str, value: float) -> int | None:
+    """Control steps of the first evaluation at which `column` is at least `value`; None if it never is."""
+    curve = read_curve(folder, column)
+    reached = np.flatnonzero(curve[:, 1] >= value)
+    return int(curve[reached[0], 0]) if len(reached) else None

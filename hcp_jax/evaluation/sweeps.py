@@ -86,7 +86,8 @@ def play_trials(
     """One episode of each of `rows`, all in one jitted call, split into `trials` equal parts."""
 
     def policy(params, obs, v_h):
-        return run.ppo.mean_action(*params, obs, v_h)
+        network, statistics = params
+        return run.ppo.mean_action(network, statistics, obs, v_h)
 
     params = (state.params["network"], state.obs_statistics)
     episodes = Evaluator(run.make_env(pool), policy)(params, v_h, rows, key)

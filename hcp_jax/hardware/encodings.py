@@ -1,12 +1,13 @@
 """Explicit encodings of hardware: the fixed vector v_h of each robot in a pool.
 
-| encoding | hopper | length |
+| encoding | length for the hopper | content |
 |---|---|---|
-| `none` | nothing | 0 |
-| `kinematics` | 4 link half-lengths (torso, thigh, leg, foot), standardised by the training pool's mean and std | 4 |
-| `kinematics+dynamics` | the above, then 4 body masses, 3 frictionloss, 3 damping, 3 armature, scaled to [0, 1] by the training pool's min and max | 17 |
-| `random` | uniform noise of the same length as `kinematics+dynamics`, fixed per robot: a control | 17 |
+| `none` | 0 | nothing |
+| `kinematics` | 4 | half-lengths of torso, thigh, leg, foot, standardised by the training pool's mean and std |
+| `kinematics+dynamics` | 17 | `kinematics`, then 4 body masses, 3 frictionloss, 3 damping, 3 armature, in [0, 1] |
+| `random` | 17 | uniform noise, fixed per robot: a control for `kinematics+dynamics` |
 
+Masses and joint dynamics are scaled to [0, 1] by the training pool's minimum and maximum.
 The scales come from the training pool, so a held-out robot may lie slightly outside [0, 1].
 """
 

@@ -5,8 +5,8 @@ import importlib.resources
 import json
 import pathlib
 from collections.abc import Sequence
+from typing import Any
 
-import chex
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -43,6 +43,8 @@ VARIANT_FIELDS = (
 MEAN_INERTIA = "stat.meaninertia"
 FORMAT = 1
 
+Array = Any  # numpy.ndarray on the host, jax.Array in jitted code
+
 
 class PoolError(ValueError):
     """A pool's files are missing, damaged or of another format, or its robots do not fit one template."""
@@ -67,15 +69,15 @@ class RobotPool:
     """
 
     template: str = struct.field(pytree_node=False)
-    fields: dict[str, chex.Array]
-    hardware: dict[str, chex.Array]
-    robot_id: chex.Array
+    fields: dict[str, Array]
+    hardware: dict[str, Array]
+    robot_id: Array
 
     @property
     def num_robots(self) -> int:
         return self.robot_id.shape[0]
 
-    def take(self, index: chex.Array) -> "RobotPool":
+    def take(self, index: Array) -> "RobotPool":
         """The robots at positions `index` [B], in that order (repeats allowed)."""
         return jax.tree.map(lambda leaf: jnp.asarray(leaf, _device_dtype(leaf))[index], self)
 
@@ -106,7 +108,7 @@ class RobotPool:
         folder = pathlib.Path(folder)
         folder.mkdir(parents=True, exist_ok=False)
         arrays = {f"fields/{k}": v for k, v in self.fields.items()} | {f"hardware/{k}": v for k, v in self.hardware.items()}
-        np.savez_compressed(folder / "pool.npz", robot_id=self.robot_id, **arrays)
+        np.savez_compressed(folder / "pool.npz", **(arrays | {"robot_id": self.robot_id}))
         (folder / "template.xml").write_text(self.template)
         description = {
             "format": FORMAT,
@@ -138,7 +140,7 @@ class RobotPool:
             raise PoolError(f"{folder}: not a robot pool ({error})") from error
 
 
-def _device_dtype(leaf: chex.Array):
+def _device_dtype(leaf: Array):
     return jnp.int32 if jnp.issubdtype(leaf.dtype, jnp.integer) else jnp.float32
 
 

@@ -6,7 +6,6 @@ state is `PhysicsState`; it keeps nothing between calls, so a rollout can be che
 
 from typing import Protocol
 
-import chex
 import jax
 import jax.numpy as jnp
 from flax import struct
@@ -22,31 +21,32 @@ MAX_VALUE = 1e10  # MuJoCo's mjMAXVAL: beyond it a state counts as diverged
 class PhysicsState:
     """State of B worlds. qpos: [B, nq]; qvel, qacc_warmstart: [B, nv]. SI units, float32."""
 
-    qpos: chex.Array
-    qvel: chex.Array
-    qacc_warmstart: chex.Array
+    qpos: jax.Array
+    qvel: jax.Array
+    qacc_warmstart: jax.Array
 
 
 class Physics(Protocol):
     """Steps worlds on one flat leading axis."""
 
     def step(
-        self, robots: RobotPool, state: PhysicsState, ctrl: chex.Array, num_substeps: int
-    ) -> tuple[PhysicsState, chex.Array]:
+        self, robots: RobotPool, state: PhysicsState, ctrl: jax.Array, num_substeps: int
+    ) -> tuple[PhysicsState, jax.Array]:
         """Advances every world by `num_substeps` with `ctrl` [B, nu] held.
 
         Returns:
             The new state, with NaN in the rows whose physics diverged, and the number of worlds whose contact or
             constraint buffer overflowed: [] int32.
         """
+        ...
 
 
-def select_rows(mask: chex.Array, on_true: PhysicsState, on_false: PhysicsState) -> PhysicsState:
+def select_rows(mask: jax.Array, on_true: PhysicsState, on_false: PhysicsState) -> PhysicsState:
     """Rows of `on_true` where `mask` [B] is set, of `on_false` elsewhere."""
     return jax.tree.map(lambda a, b: jnp.where(mask.reshape((-1,) + (1,) * (a.ndim - 1)), a, b), on_true, on_false)
 
 
-def is_finite(state: PhysicsState) -> chex.Array:
+def is_finite(state: PhysicsState) -> jax.Array:
     """Whether each world's state is usable: [B] bool."""
     rows = jnp.concatenate([state.qpos, state.qvel], axis=-1)
     return jnp.all(jnp.isfinite(rows) & (jnp.abs(rows) < MAX_VALUE), axis=-1)

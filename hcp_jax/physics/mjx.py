@@ -1,11 +1,10 @@
 """MJX on XLA or Warp, with per-robot model fields on one flat world axis."""
 
 import functools
+from typing import Any
 
-import chex
 import jax
 import jax.numpy as jnp
-import mujoco
 from mujoco import mjx
 
 from hcp_jax.hardware.pool import MEAN_INERTIA, RobotPool
@@ -59,10 +58,10 @@ class MjxPhysics:
         self._max_constraints = max_constraints
 
     def step(
-        self, robots: RobotPool, state: PhysicsState, ctrl: chex.Array, num_substeps: int
-    ) -> tuple[PhysicsState, chex.Array]:
+        self, robots: RobotPool, state: PhysicsState, ctrl: jax.Array, num_substeps: int
+    ) -> tuple[PhysicsState, jax.Array]:
         num_worlds = ctrl.shape[0]
-        fields = {
+        fields: dict[str, Any] = {
             name: values.reshape(num_worlds, *getattr(self._model, name).shape)  # Warp splits boxes into two corners
             for name, values in robots.fields.items()
             if name not in _NOT_IN_MJX
@@ -90,6 +89,6 @@ class MjxPhysics:
             return mjx.make_data(self._mj_model, impl=self._impl)
         return mjx.make_data(self._mj_model, impl="warp", naconmax=self._max_contacts * num_worlds, njmax=self._max_constraints)
 
-    def _overflow(self, data: mjx.Data) -> chex.Array:
+    def _overflow(self, data: mjx.Data) -> jax.Array:
         # impl="jax" allocates every possible contact and constraint, so it has nothing to overflow.
         return jnp.int32(data._impl.overflow) if self._impl == "warp" else jnp.int32(0)

@@ -3,7 +3,6 @@
 import os
 import threading
 
-import chex
 import jax
 import mujoco
 import mujoco.batch
@@ -43,8 +42,8 @@ class NativePhysics:
         self._lock = threading.Lock()
 
     def step(
-        self, robots: RobotPool, state: PhysicsState, ctrl: chex.Array, num_substeps: int
-    ) -> tuple[PhysicsState, chex.Array]:
+        self, robots: RobotPool, state: PhysicsState, ctrl: jax.Array, num_substeps: int
+    ) -> tuple[PhysicsState, jax.Array]:
         shapes = (
             *(jax.ShapeDtypeStruct(leaf.shape, np.float32) for leaf in (state.qpos, state.qvel, state.qacc_warmstart)),
             jax.ShapeDtypeStruct((), np.int32),
@@ -52,14 +51,15 @@ class NativePhysics:
 
         def host_step(robot_id, qpos, qvel, warmstart, ctrl):
             with self._lock:
-                return self._host_step(*map(np.asarray, (robot_id, qpos, qvel, warmstart, ctrl)), num_substeps)
+                inputs = [np.asarray(array) for array in (robot_id, qpos, qvel, warmstart, ctrl)]
+                return self._host_step(num_substeps, *inputs)
 
         qpos, qvel, warmstart, overflow = jax.pure_callback(
             host_step, shapes, robots.robot_id, state.qpos, state.qvel, state.qacc_warmstart, ctrl
         )
         return PhysicsState(qpos, qvel, warmstart), overflow
 
-    def _host_step(self, robot_id, qpos, qvel, warmstart, ctrl, num_substeps):
+    def _host_step(self, num_substeps, robot_id, qpos, qvel, warmstart, ctrl):
         num_worlds = len(robot_id)
         if num_worlds not in self._worlds:
             self._worlds[num_worlds] = _Worlds(self._models[0], num_worlds)

@@ -1,6 +1,5 @@
 """Where v_h comes from: a fixed encoding of the hardware, or an embedding learned with the policy (HCP-I)."""
 
-import chex
 import jax
 import jax.numpy as jnp
 
@@ -19,15 +18,15 @@ class Encoding:
         self._table = jnp.asarray(encode(pool, encoding, reference))
         self.size = self._table.shape[1]
 
-    def init(self, key: chex.PRNGKey) -> None:
+    def init(self, key: jax.Array) -> None:
         """No parameters."""
         return None
 
-    def v_h(self, embedding: None, index: chex.Array) -> chex.Array:
+    def v_h(self, embedding: None, index: jax.Array) -> jax.Array:
         """The encoding of the robots at positions `index` [...]: [..., K]."""
         return self._table[index]
 
-    def spread(self, embedding: None) -> chex.Array:
+    def spread(self, embedding: None) -> jax.Array:
         """Standard deviation of v_h over the pool: [K]."""
         return self._table.std(axis=0)
 
@@ -40,14 +39,14 @@ class Embedding:
     def __init__(self, num_robots: int, size: int, initial_scale: float):
         self.num_robots, self.size, self._initial_scale = num_robots, size, initial_scale
 
-    def init(self, key: chex.PRNGKey) -> chex.Array:
+    def init(self, key: jax.Array) -> jax.Array:
         return self._initial_scale * jax.random.normal(key, (self.num_robots, self.size))
 
-    def v_h(self, embedding: chex.Array, index: chex.Array) -> chex.Array:
+    def v_h(self, embedding: jax.Array, index: jax.Array) -> jax.Array:
         """The embedding of the robots at positions `index` [...]: [..., size]."""
         return embedding[index]
 
-    def spread(self, embedding: chex.Array) -> chex.Array:
+    def spread(self, embedding: jax.Array) -> jax.Array:
         """Standard deviation of v_h over the pool: [size]."""
         return jax.lax.stop_gradient(embedding).std(axis=0)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-import chex
+import jax
 import jax.numpy as jnp
 from flax import linen as nn
 
@@ -15,7 +15,7 @@ class MLP(nn.Module):
     output_scale: float = 1.0
 
     @nn.compact
-    def __call__(self, x: chex.Array) -> chex.Array:
+    def __call__(self, x: jax.Array) -> jax.Array:
         for i, size in enumerate(self.hidden_sizes):
             x = nn.selu(nn.Dense(size, name=f"hidden_{i}")(x))
         init = nn.initializers.variance_scaling(self.output_scale**2, "fan_in", "truncated_normal")
@@ -41,19 +41,19 @@ class ActorCritic(nn.Module):
         if self.with_forward_model:
             self.forward_model = MLP(self.hidden_sizes, self.observation_size)
 
-    def act(self, obs: chex.Array, v_h: chex.Array) -> tuple[chex.Array, chex.Array]:
+    def act(self, obs: jax.Array, v_h: jax.Array) -> tuple[jax.Array, jax.Array]:
         """Mean [..., A] and log std [A] of the action."""
         return self.policy(jnp.concatenate([obs, v_h], axis=-1)), self.log_std
 
-    def value(self, obs: chex.Array, v_h: chex.Array) -> chex.Array:
+    def value(self, obs: jax.Array, v_h: jax.Array) -> jax.Array:
         """Expected scaled return: [...]."""
         return self.value_function(jnp.concatenate([obs, v_h], axis=-1))[..., 0]
 
-    def predict(self, obs: chex.Array, action: chex.Array, v_h: chex.Array) -> chex.Array:
+    def predict(self, obs: jax.Array, action: jax.Array, v_h: jax.Array) -> jax.Array:
         """Expected change of the observation in one control step, in units of its standard deviation: [..., O]."""
         return self.forward_model(jnp.concatenate([obs, action, v_h], axis=-1))
 
-    def __call__(self, obs: chex.Array, action: chex.Array, v_h: chex.Array):
+    def __call__(self, obs: jax.Array, action: jax.Array, v_h: jax.Array):
         """Touches every parameter; used for initialisation alone."""
         predicted = self.predict(obs, action, v_h) if self.with_forward_model else None
         return self.act(obs, v_h), self.value(obs, v_h), predicted

@@ -108,9 +108,8 @@ class Checkpoints:
             if name not in saved:
                 raise CheckpointError(f"{self.folder}/{iteration}: another architecture: it has no {name}")
             if saved[name] != leaf.shape:
-                raise CheckpointError(
-                    f"{self.folder}/{iteration}: another architecture: {name} is {saved[name]}, the config asks for {leaf.shape}"
-                )
+                shapes = f"{name} is {saved[name]}, the config asks for {leaf.shape}"
+                raise CheckpointError(f"{self.folder}/{iteration}: another architecture: {shapes}")
 
 
 def _name(path) -> str:

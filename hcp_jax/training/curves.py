@@ -3,13 +3,10 @@
 import pathlib
 from collections.abc import Sequence
 
-import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
 
 from hcp_jax.training.metrics import METRICS_FILE, read_rows
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt  # noqa: E402
 
 _SERIES = {
     "train_return_mean": "training robots",
@@ -20,7 +17,8 @@ _SERIES = {
 
 def plot_curves(folders: Sequence[pathlib.Path], path: pathlib.Path) -> None:
     """Draws the evaluation returns of run folders over control steps into a PNG file."""
-    figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
+    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    axes = figure.subplots()
     for folder in folders:
         rows = read_rows(folder / METRICS_FILE)
         for column, label in _SERIES.items():
@@ -33,4 +31,3 @@ def plot_curves(folders: Sequence[pathlib.Path], path: pathlib.Path) -> None:
     axes.grid(alpha=0.3)
     axes.legend(frameon=False)
     figure.savefig(path, dpi=130)
-    plt.close(figure)

@@ -19,13 +19,13 @@ import numpy as np
 from hcp_jax.algorithms.ppo import PPOState, zero_sums
 from hcp_jax.config import Config
 from hcp_jax.envs.episodes import Episodes
+from hcp_jax.experiment import Experiment, evaluate_run, fit_embedding, make_experiment
 from hcp_jax.physics.base import PhysicsOverflowError
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import Checkpoints
 from hcp_jax.training.curves import plot_curves
 from hcp_jax.training.metrics import MetricsWriter
 from hcp_jax.training.progress import Progress, format_seconds
-from hcp_jax.experiment import Experiment, evaluate_run, fit_embedding, make_experiment
 from hcp_jax.training.warm_start import load_init
 
 # Control steps between two progress lines: a few seconds of work.
@@ -65,7 +65,7 @@ def train(config: Config, folder: pathlib.Path, resume: bool = False) -> dict[st
         run_folder.check_resumable(folder, config)
     else:
         run_folder.check_new(folder)
-    init = load_init(config) if config.init and not resume else None
+    init = load_init(config) if config.init else None
     print(f"{config.name}: compiling {config.pool.num_robots + config.pool.num_heldout} robots", flush=True)
     run = make_experiment(config)
     state = run.init_state()
@@ -73,11 +73,13 @@ def train(config: Config, folder: pathlib.Path, resume: bool = False) -> dict[st
         state = init(run, state)
     checkpoints = Checkpoints(folder / run_folder.CHECKPOINT_FOLDER, config.keep_checkpoints)
     iteration = 0
-    if resume:
+    if resume and checkpoints.iterations():
         iteration, state, skipped = checkpoints.restore(state)
         for line in skipped:
             print(line, flush=True)
         print(f"resuming at {iteration * config.batch_size:,} steps", flush=True)
+    elif resume:
+        print("the run ended before its first checkpoint: starting again", flush=True)
     else:
         run_folder.write_start(folder, config, run.physics)
     interrupt = Interrupt()

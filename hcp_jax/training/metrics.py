@@ -6,6 +6,7 @@
 import csv
 import os
 import pathlib
+from typing import Any
 
 import tensorboardX
 
@@ -23,7 +24,7 @@ class MetricsWriter:
             _write_rows(folder / name, rows)
         self._events = tensorboardX.SummaryWriter(str(folder / "events"), purge_step=resume_env_steps + 1)
 
-    def write(self, metrics: dict[str, float], timing: dict[str, float]) -> None:
+    def write(self, metrics: dict[str, Any], timing: dict[str, Any]) -> None:
         """Adds one evaluation. Both records start with `env_steps`."""
         for name, record in ((METRICS_FILE, metrics), (TIMING_FILE, timing)):
             row = {key: _format(value) for key, value in record.items()}

@@ -7,9 +7,9 @@ import jax.numpy as jnp
 
 from hcp_jax.algorithms.ppo import PPOState
 from hcp_jax.config import Config
+from hcp_jax.experiment import Experiment, copy_tree, make_experiment
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
-from hcp_jax.experiment import Experiment, copy_tree, make_experiment
 
 
 def load_state(folder: pathlib.Path, run: Experiment, best: bool = False) -> tuple[int, PPOState]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-import chex
 import jax
 import jax.numpy as jnp
 
@@ -16,13 +15,13 @@ class ProbeEnv:
     action_size = 1
     num_robots = 2
 
-    def __init__(self, length: int, reward: Callable[..., chex.Array], truncates: bool = False):
+    def __init__(self, length: int, reward: Callable[..., jax.Array], truncates: bool = False):
         self._length, self._reward, self._truncates = length, reward, truncates
 
-    def initial_index(self, key: chex.PRNGKey, num_envs: int) -> chex.Array:
+    def initial_index(self, key: jax.Array, num_envs: int) -> jax.Array:
         return jnp.arange(num_envs, dtype=jnp.int32) % self.num_robots
 
-    def reset(self, key: chex.PRNGKey, index: chex.Array) -> EnvState:
+    def reset(self, key: jax.Array, index: jax.Array) -> EnvState:
         step = jnp.zeros(index.shape, jnp.int32)
         return EnvState(
             physics=jnp.zeros(index.shape),
@@ -33,7 +32,7 @@ class ProbeEnv:
             key=jnp.copy(key),
         )
 
-    def step(self, state: EnvState, action: chex.Array) -> tuple[EnvState, Transition]:
+    def step(self, state: EnvState, action: jax.Array) -> tuple[EnvState, Transition]:
         action = jnp.clip(action[:, 0], -1, 1)
         first_action = jnp.where(state.step_count == 0, action, state.physics)
         reward = self._reward(state.index, state.step_count, first_action, action)
@@ -67,5 +66,5 @@ class ProbeEnv:
             transition,
         )
 
-    def _observe(self, step: chex.Array) -> chex.Array:
+    def _observe(self, step: jax.Array) -> jax.Array:
         return jnp.stack([jnp.ones(step.shape), step.astype(jnp.float32)], axis=-1)

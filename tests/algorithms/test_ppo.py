@@ -104,7 +104,7 @@ def test_two_robots_that_need_opposite_actions_are_not_solved_without_v_h():
 
 
 def test_a_frozen_network_still_learns_the_embedding_of_new_robots():
-    ppo, state = learn(ProbeEnv(1, opposite_actions), Embedding(2, 2, 0.05))
+    _, state = learn(ProbeEnv(1, opposite_actions), Embedding(2, 2, 0.05))
     network = jax.tree.map(np.asarray, state.params["network"])
     swapped = ProbeEnv(1, lambda index, *args: opposite_actions(1 - index, *args))
     learner = PPO(swapped, Embedding(2, 2, 0.05), CONFIG, EMBEDDING, NUM_ENVS, 60, train_network=False)

@@ -1,0 +1,105 @@
+"""What is published of the hopper: tables, curves and pictures from run folders."""
+
+import pathlib
+import shutil
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from hcp_jax.evaluation.embedding import knn_r2, plot_embedding
+from hcp_jax.evaluation.statistics import write_json
+from hcp_jax.evaluation.summary import read_curve, read_run_commit, steps_to_reach, summarise_runs
+from hcp_jax.experiment import make_experiment
+from hcp_jax.training.metrics import METRICS_FILE
+from hcp_jax.training.run_folder import CONFIG_FILE, ENVIRONMENT_FILE, read_config
+from hcp_jax.training.warm_start import load_state
+
+
+def collect(runs: pathlib.Path, out: pathlib.Path) -> list[str]:
+    """Writes `out` from the run folders under `runs`; returns a line for each thing written.
+
+    `summary.json` (a row per algorithm), `curves.png`, each run's `metrics.csv`, config and environment under `runs/`,
+    `finetune.json` and `finetune.png` if there are `hopper_finetune` runs, `embedding.json` and `embedding.png` if
+    there is a `hopper_embedding` run.
+    """
+    folders = sorted(path.parent for path in runs.glob(f"*/{CONFIG_FILE}") if (path.parent / METRICS_FILE).exists())
+    by_name: dict[str, list[pathlib.Path]] = {}
+    for folder in folders:
+        by_name.setdefault(read_config(folder).name, []).append(folder)
+        copy = out / "runs" / folder.name
+        copy.mkdir(parents=True, exist_ok=True)
+        for name in (CONFIG_FILE, ENVIRONMENT_FILE, METRICS_FILE, "timing.csv"):
+            shutil.copy(folder / name, copy / name)
+    special = ("hopper_finetune", "hopper_embedding")
+    main = {name: folders for name, folders in by_name.items() if name not in special}
+    write_json(out / "summary.json", summarise_runs([folder for folders in main.values() for folder in folders]))
+    plot_groups(main, out / "curves.png", ("train_return_mean", "heldout_return_mean"))
+    written = [f"{out}/summary.json, {out}/curves.png: {', '.join(main)}"]
+    if "hopper_finetune" in by_name:
+        written.append(write_finetune(by_name["hopper_finetune"], out))
+    if "hopper_embedding" in by_name:
+        written.append(write_embedding(by_name["hopper_embedding"][0], out))
+    return written
+
+
+def plot_groups(groups: Mapping[str, Sequence[pathlib.Path]], path: pathlib.Path, columns: Sequence[str]) -> None:
+    """Mean over seeds of each group's curve, with the range over seeds shaded; one panel per column."""
+    figure = Figure((6 * len(columns), 4.5), layout="constrained")
+    panels = figure.subplots(1, len(columns), sharey=True, squeeze=False)[0]
+    for column, axes in zip(columns, panels, strict=True):
+        for name, folders in groups.items():
+            curves = [read_curve(folder, column) for folder in folders]
+            length = min(len(curve) for curve in curves)
+            steps, values = curves[0][:length, 0] / 1e6, np.stack([curve[:length, 1] for curve in curves])
+            axes.plot(steps, values.mean(axis=0), label=f"{name} ({len(folders)} seeds)")
+            axes.fill_between(steps, values.min(axis=0), values.max(axis=0), alpha=0.2)
+        axes.set_title(column.replace("_", " "))
+        axes.set_xlabel("control steps [million]")
+        axes.grid(alpha=0.3)
+    panels[0].set_ylabel("return of one episode")
+    panels[0].legend(frameon=False)
+    figure.savefig(path, dpi=120)
+
+
+def write_finetune(folders: Sequence[pathlib.Path], out: pathlib.Path) -> str:
+    """Steps at which runs from a pretrained one reach the final return of the runs from scratch."""
+    scratch = [folder for folder in folders if not read_config(folder).init]
+    pretrained = [folder for folder in folders if read_config(folder).init]
+    rows = []
+    for folder in pretrained:
+        seed = read_config(folder).seed
+        for other in scratch:
+            if read_config(other).seed == seed:
+                curve = read_curve(other, "train_return_mean")
+                reached = steps_to_reach(folder, "train_return_mean", curve[-1, 1])
+                rows.append(
+                    {
+                        "seed": seed,
+                        "scratch_final_return": round(float(curve[-1, 1]), 1),
+                        "scratch_env_steps": int(curve[-1, 0]),
+                        "pretrained_final_return": round(float(read_curve(folder, "train_return_mean")[-1, 1]), 1),
+                        "pretrained_steps_to_scratch_final": reached,
+                    }
+                )
+    write_json(out / "finetune.json", rows)
+    plot_groups({"from scratch": scratch, "pretrained": pretrained}, out / "finetune.png", ("train_return_mean",))
+    return f"{out}/finetune.json, {out}/finetune.png: {rows}"
+
+
+def write_embedding(folder: pathlib.Path, out: pathlib.Path) -> str:
+    """R^2 of the torso mass from the 2-D embedding, and its scatter plot."""
+    run = make_experiment(read_config(folder))
+    iteration, state = load_state(folder, run)
+    embedding, mass = np.asarray(state.params["embedding"]), run.train_pool.hardware["body_mass"][:, 0]
+    record = {
+        "run": folder.name,
+        "env_steps": iteration * run.config.batch_size,
+        "neighbours": 5,
+        "folds": 5,
+        "r2": round(knn_r2(embedding, mass), 4),
+        "commit": read_run_commit(folder),
+    }
+    write_json(out / "embedding.json", record)
+    plot_embedding(embedding, mass, out / "embedding.png")
+    return f"{out}/embedding.json, {out}/embedding.png: R^2 {record['r2']}"
