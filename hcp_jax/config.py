@@ -141,6 +141,7 @@ class EmbeddingConfig:
         learning_rate: Adam's step for the embedding, decayed like the networks'.
         prediction_cost: weight of the loss of a forward model that predicts the next observation from observation, action and
             v_h; its gradient grounds v_h in the robot's dynamics. 0 leaves the model out.
+        model_learning_rate: Adam's step for the forward model, decayed like the networks'.
         policy_gradient: whether the gradients of policy and value loss reach v_h.
         fit_steps: control steps for fitting v_h of the held-out robots, with the networks frozen, at the end of a run.
     """
@@ -149,12 +150,14 @@ class EmbeddingConfig:
     initial_scale: float = 0.05
     learning_rate: float = 1e-3
     prediction_cost: float = 0.0
+    model_learning_rate: float = 1e-3
     policy_gradient: bool = True
     fit_steps: int = 1_000_000
 
     def __post_init__(self):
         _require(self.size >= 1, "embedding.size", self.size, "at least 1")
-        _require(_positive(self.learning_rate), "embedding.learning_rate", self.learning_rate, "a number above 0")
+        for name in ("learning_rate", "model_learning_rate"):
+            _require(_positive(getattr(self, name)), f"embedding.{name}", getattr(self, name), "a number above 0")
         for name in ("initial_scale", "prediction_cost", "fit_steps"):
             _require(_at_least_zero(getattr(self, name)), f"embedding.{name}", getattr(self, name), "a number of at least 0")
         _require(

@@ -22,8 +22,8 @@ FAST_PPO = PPOConfig(
 FAST_HOPPER = HopperConfig(integrator="euler")
 # HCP-I grounded in dynamics: a narrow v_h that learns from a forward model alone, and policy and value function that see it
 # through noise. The paper's plain form (32 wide, from the gradients of policy and value loss) is `EmbeddingConfig()`.
-GROUNDED_EMBEDDING = EmbeddingConfig(size=8, prediction_cost=1.0, policy_gradient=False)
-GROUNDED_PPO = dataclasses.replace(FAST_PPO, v_h_noise=0.3)
+GROUNDED_EMBEDDING = EmbeddingConfig(size=8, learning_rate=5e-3, prediction_cost=1.0, policy_gradient=False)
+GROUNDED_PPO = dataclasses.replace(FAST_PPO, v_h_noise=0.1)
 # The paper's run: 8 environments, whole episodes, RK4.
 PAPER_NUM_ENVS = 8
 

@@ -115,15 +115,23 @@ class PPO:
         config = self.config
         num_updates = num_iterations * config.num_epochs * config.num_minibatches
         decay = config.final_learning_rate / config.learning_rate
-        network = optax.chain(
-            optax.clip_by_global_norm(config.max_grad_norm),
-            optax.adam(optax.linear_schedule(config.learning_rate, config.learning_rate * decay, num_updates), eps=1e-5),
-        )
-        embedding_rate = self.embedding.learning_rate
-        embedding = optax.adam(optax.linear_schedule(embedding_rate, embedding_rate * decay, num_updates), eps=1e-8)
+
+        def adam(learning_rate: float, eps: float) -> optax.GradientTransformation:
+            return optax.adam(optax.linear_schedule(learning_rate, learning_rate * decay, num_updates), eps=eps)
+
+        clip = optax.clip_by_global_norm(config.max_grad_norm)
+        network = optax.chain(clip, adam(config.learning_rate, eps=1e-5))
+        model = optax.chain(clip, adam(self.embedding.model_learning_rate, eps=1e-5))
+        # A row's gradient is its robot's share of a minibatch, so it is tiny: no clipping, a small eps.
+        embedding = adam(self.embedding.learning_rate, eps=1e-8)
+        frozen = optax.set_to_zero()
         return optax.multi_transform(
-            {"network": network if self._train_network else optax.set_to_zero(), "embedding": embedding},
-            {"network": "network", "embedding": "embedding"},
+            {
+                "network": network if self._train_network else frozen,
+                "forward_model": model if self._train_network else frozen,
+                "embedding": embedding,
+            },
+            label_params,
         )
 
     def init_params(self, key: jax.Array) -> Params:
@@ -293,6 +301,16 @@ class PPO:
         change = running_statistics.normalize(batch.next_obs - batch.obs, statistics, max_abs_value=5.0)
         predicted = self._apply(params["network"], obs, batch.executed_action, v_h, method="predict")
         return jnp.mean(optax.huber_loss(predicted, change, delta=1.0))
+
+
+def label_params(params: Params) -> Any:
+    """Names the optimiser of each parameter: `network`, `forward_model` or `embedding`."""
+
+    def label(path, _) -> str:
+        names = {getattr(key, "key", None) for key in path}
+        return next((name for name in ("embedding", "forward_model") if name in names), "network")
+
+    return jax.tree_util.tree_map_with_path(label, params)
 
 
 def clipped_surrogate(log_ratio: jax.Array, advantage: jax.Array, clip_eps: float) -> jax.Array:
