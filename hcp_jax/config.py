@@ -142,6 +142,8 @@ class EmbeddingConfig:
         prediction_cost: weight of the loss of a forward model that predicts the next observation from observation, action and
             v_h; its gradient grounds v_h in the robot's dynamics. 0 leaves the model out.
         model_learning_rate: Adam's step for the forward model, decayed like the networks'.
+        settle_steps: control steps after which embedding and forward model keep a fiftieth of their step size, so that the
+            policy sees a v_h that stands still; 0 decays them like the networks.
         policy_gradient: whether the gradients of policy and value loss reach v_h.
         fit_steps: control steps for fitting v_h of the held-out robots, with the networks frozen, at the end of a run.
     """
@@ -151,6 +153,7 @@ class EmbeddingConfig:
     learning_rate: float = 1e-3
     prediction_cost: float = 0.0
     model_learning_rate: float = 1e-3
+    settle_steps: int = 0
     policy_gradient: bool = True
     fit_steps: int = 1_000_000
 
@@ -158,7 +161,7 @@ class EmbeddingConfig:
         _require(self.size >= 1, "embedding.size", self.size, "at least 1")
         for name in ("learning_rate", "model_learning_rate"):
             _require(_positive(getattr(self, name)), f"embedding.{name}", getattr(self, name), "a number above 0")
-        for name in ("initial_scale", "prediction_cost", "fit_steps"):
+        for name in ("initial_scale", "prediction_cost", "settle_steps", "fit_steps"):
             _require(_at_least_zero(getattr(self, name)), f"embedding.{name}", getattr(self, name), "a number of at least 0")
         _require(
             self.policy_gradient or self.prediction_cost > 0,

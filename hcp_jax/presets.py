@@ -6,7 +6,7 @@ from hcp_jax.config import Config, EmbeddingConfig, HopperConfig, PPOConfig
 
 # Many environments, short unrolls: one environment per robot, 32 steps each. Rewards are scaled so that value targets are
 # of order 1, observations are whitened, the step size decays, and physics is integrated by Euler at 2 ms instead of RK4
-# (3 times faster; docs/hopper.md has the difference).
+# (about 3 times faster).
 FAST_PPO = PPOConfig(
     preset="fast",
     unroll_length=32,
@@ -22,7 +22,9 @@ FAST_PPO = PPOConfig(
 FAST_HOPPER = HopperConfig(integrator="euler")
 # HCP-I grounded in dynamics: a narrow v_h that learns from a forward model alone, and policy and value function that see it
 # through noise. The paper's plain form (32 wide, from the gradients of policy and value loss) is `EmbeddingConfig()`.
-GROUNDED_EMBEDDING = EmbeddingConfig(size=8, learning_rate=5e-3, prediction_cost=1.0, policy_gradient=False)
+GROUNDED_EMBEDDING = EmbeddingConfig(
+    size=8, learning_rate=5e-3, prediction_cost=1.0, policy_gradient=False, settle_steps=4_000_000
+)
 GROUNDED_PPO = dataclasses.replace(FAST_PPO, v_h_noise=0.1)
 # The paper's run: 8 environments, whole episodes, RK4.
 PAPER_NUM_ENVS = 8

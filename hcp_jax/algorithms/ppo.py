@@ -23,6 +23,8 @@ from hcp_jax.policies.conditioning import Conditioning
 from hcp_jax.policies.distribution import gaussian_entropy, gaussian_log_prob, sample_gaussian
 from hcp_jax.policies.networks import ActorCritic
 
+# Share of their first step size that embedding and forward model keep once settled.
+SETTLED = 0.02
 Params = dict[str, Any]  # {"network": ..., "embedding": [N, K] or None}
 
 
@@ -116,14 +118,20 @@ class PPO:
         num_updates = num_iterations * config.num_epochs * config.num_minibatches
         decay = config.final_learning_rate / config.learning_rate
 
-        def adam(learning_rate: float, eps: float) -> optax.GradientTransformation:
-            return optax.adam(optax.linear_schedule(learning_rate, learning_rate * decay, num_updates), eps=eps)
-
         clip = optax.clip_by_global_norm(config.max_grad_norm)
-        network = optax.chain(clip, adam(config.learning_rate, eps=1e-5))
-        model = optax.chain(clip, adam(self.embedding.model_learning_rate, eps=1e-5))
+        rate = optax.linear_schedule(config.learning_rate, config.final_learning_rate, num_updates)
+        network = optax.chain(clip, optax.adam(rate, eps=1e-5))
+        final, updates = decay, num_updates
+        if self.embedding.settle_steps:
+            settle_iterations = self.embedding.settle_steps / (self.num_envs * config.unroll_length)
+            final, updates = SETTLED, max(1, round(settle_iterations * config.num_epochs * config.num_minibatches))
+
+        def settling(learning_rate: float) -> optax.Schedule:
+            return optax.linear_schedule(learning_rate, learning_rate * final, updates)
+
+        model = optax.chain(clip, optax.adam(settling(self.embedding.model_learning_rate), eps=1e-5))
         # A row's gradient is its robot's share of a minibatch, so it is tiny: no clipping, a small eps.
-        embedding = adam(self.embedding.learning_rate, eps=1e-8)
+        embedding = optax.adam(settling(self.embedding.learning_rate), eps=1e-8)
         frozen = optax.set_to_zero()
         return optax.multi_transform(
             {

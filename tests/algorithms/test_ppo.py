@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from hcp_jax.algorithms.ppo import PPO, clipped_surrogate, clipped_value_loss
+from hcp_jax.algorithms.ppo import PPO, clipped_surrogate, clipped_value_loss, label_params
 from hcp_jax.config import EmbeddingConfig, PPOConfig
 from hcp_jax.policies.conditioning import Embedding
 
@@ -167,3 +167,24 @@ def test_a_clipped_value_is_charged_the_larger_error():
     value, old, target = jnp.asarray([1.0]), jnp.asarray([0.0]), jnp.asarray([1.0])
     np.testing.assert_allclose(clipped_value_loss(value, old, target, 0.2), 0.5 * 0.8**2, rtol=1e-5)
     np.testing.assert_allclose(clipped_value_loss(value, old, target, 0.0), 0.0, atol=1e-7)
+
+
+def test_a_settled_embedding_stands_still_while_an_unsettled_one_moves():
+    def displacement(settle_steps: int) -> float:
+        embedding = dataclasses.replace(EMBEDDING, prediction_cost=1.0, settle_steps=settle_steps)
+        ppo = PPO(ProbeEnv(1, opposite_actions), Embedding(2, 2, 0.05), CONFIG, embedding, NUM_ENVS, 100)
+        state = ppo.init(jax.random.key(0))
+        table = np.asarray(state.params["embedding"])
+        return float(np.abs(np.asarray(ppo.train(state, 5).params["embedding"]) - table).max())
+
+    assert displacement(settle_steps=1) < 0.1 * displacement(settle_steps=0)
+
+
+def test_every_parameter_has_one_optimiser():
+    embedding = dataclasses.replace(EMBEDDING, prediction_cost=1.0)
+    ppo = PPO(ProbeEnv(1, opposite_actions), Embedding(2, 2, 0.05), CONFIG, embedding, NUM_ENVS, 1)
+    labels = label_params(ppo.init_params(jax.random.key(0)))
+    parts = labels["network"]["params"]
+    assert labels["embedding"] == "embedding"
+    assert set(jax.tree.leaves(parts["forward_model"])) == {"forward_model"}
+    assert set(jax.tree.leaves([parts["policy"], parts["value_function"], parts["log_std"]])) == {"network"}
