@@ -1,4 +1,4 @@
-"""HCP-I with the paper's own hyperparameters (appendix, table "Hyperparameters for hopper"): 8 environments, RK4. Preset: paper."""
+"""HCP-I with the paper's own hyperparameters (appendix, "Hyperparameters for hopper"): 8 environments, RK4. Preset: paper."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config
