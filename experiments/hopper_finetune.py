@@ -16,6 +16,5 @@ def get_config() -> Config:
         num_envs=1000,
         init="runs/hopper_hcpi",
         pool=PoolConfig(num_robots=100, split="new"),
-        ppo=presets.GROUNDED_PPO,
         embedding=presets.GROUNDED_EMBEDDING,
     )

@@ -91,8 +91,6 @@ class PPOConfig:
         initial_log_std: of the actions.
         normalize_observation: whiten observations by running statistics (released code: no).
         reward_scale: factor on rewards as the learner sees them.
-        v_h_noise: noise on v_h at every training step, in standard deviations of v_h over the pool: keeps the policy from
-            learning its training robots by heart.
     """
 
     preset: str = "paper"
@@ -112,14 +110,13 @@ class PPOConfig:
     initial_log_std: float = 0.0
     normalize_observation: bool = False
     reward_scale: float = 1.0
-    v_h_noise: float = 0.0
 
     def __post_init__(self):
         for name in ("unroll_length", "num_epochs", "num_minibatches"):
             _require(getattr(self, name) >= 1, f"ppo.{name}", getattr(self, name), "at least 1")
         for name in ("learning_rate", "clip_eps", "max_grad_norm", "reward_scale"):
             _require(_positive(getattr(self, name)), f"ppo.{name}", getattr(self, name), "a number above 0")
-        for name in ("final_learning_rate", "value_clip_eps", "value_cost", "entropy_cost", "v_h_noise"):
+        for name in ("final_learning_rate", "value_clip_eps", "value_cost", "entropy_cost"):
             _require(_at_least_zero(getattr(self, name)), f"ppo.{name}", getattr(self, name), "a number of at least 0")
         for name in ("gamma", "gae_lambda"):
             _require(0.0 <= getattr(self, name) <= 1.0, f"ppo.{name}", getattr(self, name), "a number in [0, 1]")

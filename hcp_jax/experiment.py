@@ -132,8 +132,8 @@ def fit_embedding(run: Experiment, state: PPOState, pool: RobotPool, env_steps: 
     ppo = PPO(
         run.make_env(pool),
         Embedding(pool.num_robots, config.embedding.size, config.embedding.initial_scale),
-        dataclasses.replace(config.ppo, final_learning_rate=config.ppo.learning_rate),
-        config.embedding,
+        config.ppo,
+        dataclasses.replace(config.embedding, settle_steps=env_steps),
         config.resolved_num_envs,
         num_iterations,
         train_network=False,

@@ -53,7 +53,6 @@ class Batch:
     advantage: jax.Array
     target: jax.Array
     index: jax.Array
-    noise: jax.Array
 
 
 @struct.dataclass
@@ -183,8 +182,8 @@ class PPO:
 
     def _train_iteration(self, state: PPOState) -> PPOState:
         key, key_collect, key_update = jax.random.split(state.key, 3)
-        env_state, (transitions, log_prob, action, noise) = self._collect(state, key_collect)
-        batch, episode_sums = self._make_batch(state, transitions, log_prob, action, noise)
+        env_state, (transitions, log_prob, action) = self._collect(state, key_collect)
+        batch, episode_sums = self._make_batch(state, transitions, log_prob, action)
         params, opt_state, losses = self._update(state, batch, key_update)
         deltas = (transitions.next_obs - transitions.obs).reshape(-1, self.env.observation_size)
         sums = {"iterations": jnp.ones(()), **episode_sums, **{k: jnp.mean(v) for k, v in losses.items()}}
@@ -204,25 +203,22 @@ class PPO:
         return running_statistics.update(statistics, rows) if self._train_network else statistics
 
     def _collect(self, state: PPOState, key: jax.Array):
-        """Rolls the current policy out: transitions, log_prob, sampled action, noise on v_h, each [T, B, ...]."""
-        noise_scale = self.config.v_h_noise * self.conditioning.spread(state.params["embedding"])
+        """Rolls the current policy out: transitions, log_prob, sampled action, each [T, B, ...]."""
 
-        def step(env_state, key_step):
-            key_action, key_noise = jax.random.split(key_step)
-            noise = noise_scale * jax.random.normal(key_noise, (self.num_envs, self.conditioning.size))
-            v_h = self.conditioning.v_h(state.params["embedding"], env_state.index) + noise
+        def step(env_state, key_action):
+            v_h = self.conditioning.v_h(state.params["embedding"], env_state.index)
             obs = self.normalize(env_state.obs, state.obs_statistics)
             mean, log_std = self._apply(state.params["network"], obs, v_h, method="act")
             action = sample_gaussian(mean, log_std, key_action)
             log_prob = gaussian_log_prob(mean, log_std, action)
             env_state, transition = self.env.step(env_state, action)
-            return env_state, (transition, log_prob, action, noise)
+            return env_state, (transition, log_prob, action)
 
         return jax.lax.scan(step, state.env_state, jax.random.split(key, self.config.unroll_length))
 
-    def _make_batch(self, state: PPOState, transitions: Transition, log_prob, action, noise) -> tuple[Batch, dict]:
+    def _make_batch(self, state: PPOState, transitions: Transition, log_prob, action) -> tuple[Batch, dict]:
         config = self.config
-        v_h = self.conditioning.v_h(state.params["embedding"], transitions.index) + noise
+        v_h = self.conditioning.v_h(state.params["embedding"], transitions.index)
         obs = self.normalize(transitions.obs, state.obs_statistics)
         next_obs = self.normalize(transitions.next_obs, state.obs_statistics)
         value = self._apply(state.params["network"], obs, v_h, method="value")
@@ -246,7 +242,6 @@ class PPO:
             advantage=(advantage - advantage.mean()) / (advantage.std() + 1e-8),
             target=target,
             index=transitions.index,
-            noise=noise,
         )
         done = transitions.done
         sums = {
@@ -280,7 +275,7 @@ class PPO:
     def _loss(self, params: Params, batch: Batch, state: PPOState) -> tuple[jax.Array, dict]:
         config = self.config
         v_h = self.conditioning.v_h(params["embedding"], batch.index)
-        policy_v_h = (v_h if self.embedding.policy_gradient else jax.lax.stop_gradient(v_h)) + batch.noise
+        policy_v_h = v_h if self.embedding.policy_gradient else jax.lax.stop_gradient(v_h)
         obs = self.normalize(batch.obs, state.obs_statistics)
         mean, log_std = self._apply(params["network"], obs, policy_v_h, method="act")
         value = self._apply(params["network"], obs, policy_v_h, method="value")

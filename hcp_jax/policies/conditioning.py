@@ -26,10 +26,6 @@ class Encoding:
         """The encoding of the robots at positions `index` [...]: [..., K]."""
         return self._table[index]
 
-    def spread(self, embedding: None) -> jax.Array:
-        """Standard deviation of v_h over the pool: [K]."""
-        return self._table.std(axis=0)
-
 
 class Embedding:
     """v_h is row `index` of a learned table [num_robots, size] (paper, section 3.2: implicit encoding)."""
@@ -45,10 +41,6 @@ class Embedding:
     def v_h(self, embedding: jax.Array, index: jax.Array) -> jax.Array:
         """The embedding of the robots at positions `index` [...]: [..., size]."""
         return embedding[index]
-
-    def spread(self, embedding: jax.Array) -> jax.Array:
-        """Standard deviation of v_h over the pool: [size]."""
-        return jax.lax.stop_gradient(embedding).std(axis=0)
 
 
 Conditioning = Encoding | Embedding

@@ -43,9 +43,6 @@ class NoHardware:
     def v_h(self, embedding, index):
         return jnp.zeros((*index.shape, 0))
 
-    def spread(self, embedding):
-        return jnp.zeros(0)
-
 
 def learn(env, conditioning=None, iterations=60, seed=0, config=CONFIG, embedding=EMBEDDING):
     ppo = PPO(env, conditioning or NoHardware(), config, embedding, NUM_ENVS, iterations)

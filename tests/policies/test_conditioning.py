@@ -24,4 +24,3 @@ def test_an_encoding_has_no_parameters_and_looks_rows_up(pool, key):
     encoding = Encoding(pool, "kinematics", pool)
     assert encoding.init(key) is None
     assert encoding.v_h(None, np.array([4, 4])).shape == (2, 4)
-    np.testing.assert_allclose(encoding.spread(None), 1.0, rtol=1e-5)
