@@ -145,8 +145,9 @@ class TrainingLoop:
         }
         state = state.replace(sums=zero_sums())
         is_best = metrics[_BEST] >= max((float(row[_BEST]) for row in self._metrics.rows()), default=-math.inf)
-        self._checkpoints.save(self._iteration, state, is_best)
+        # The row first: a resumed run drops rows after its checkpoint, but could not make up for one that is missing.
         self._metrics.write(metrics, timing)
+        self._checkpoints.save(self._iteration, state, is_best)
         line = f"return {metrics['train_return_mean']:.0f} on training robots, {metrics['heldout_return_mean']:.0f} held out"
         if fitted is not None:
             line += f", {metrics['heldout_fitted_return_mean']:.0f} held out with fitted v_h"
