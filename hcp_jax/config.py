@@ -142,7 +142,8 @@ class EmbeddingConfig:
         settle_steps: control steps after which embedding and forward model keep a fiftieth of their step size, so that the
             policy sees a v_h that stands still; 0 decays them like the networks.
         policy_gradient: whether the gradients of policy and value loss reach v_h.
-        fit_steps: control steps for fitting v_h of the held-out robots, with the networks frozen, at the end of a run.
+        fit_steps: control steps of each held-out robot for fitting its v_h at every evaluation, with the networks frozen; 0
+            does not fit.
     """
 
     size: int = 32
@@ -152,7 +153,7 @@ class EmbeddingConfig:
     model_learning_rate: float = 1e-3
     settle_steps: int = 0
     policy_gradient: bool = True
-    fit_steps: int = 1_000_000
+    fit_steps: int = 3_200
 
     def __post_init__(self):
         _require(self.size >= 1, "embedding.size", self.size, "at least 1")

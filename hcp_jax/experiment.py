@@ -121,33 +121,45 @@ def evaluate_run(run: Experiment, state: PPOState, heldout: jax.Array | None = N
     return episodes.take(slice(0, count)), episodes.take(slice(count, None))
 
 
-def fit_embedding(run: Experiment, state: PPOState, pool: RobotPool, env_steps: int) -> jax.Array:
-    """Learns v_h of new robots from their experience, with the networks frozen (paper, section 5.2, made honest).
+class EmbeddingFitter:
+    """Learns v_h of a pool's robots from their experience, with the networks frozen (paper, section 5.2, made honest).
 
-    Starts from the mean embedding of the training robots and runs the training's own objective for `env_steps` control
-    steps in `num_envs` environments. Returns v_h: [pool.num_robots, K].
+    Starts from the mean embedding of the training robots and runs the training's own objective.
     """
-    config = run.config
-    num_iterations = max(1, round(env_steps / config.batch_size))
-    ppo = PPO(
-        run.make_env(pool),
-        Embedding(pool.num_robots, config.embedding.size, config.embedding.initial_scale),
-        config.ppo,
-        dataclasses.replace(config.embedding, settle_steps=env_steps),
-        config.resolved_num_envs,
-        num_iterations,
-        train_network=False,
-    )
-    fit_state = ppo.init(jax.random.fold_in(jax.random.key(config.seed), _FIT))
-    fit_state = fit_state.replace(
-        params={
+
+    def __init__(self, run: Experiment, pool: RobotPool, steps_per_robot: int):
+        """Args:
+        run: the experiment whose robots the networks were trained on.
+        pool: the new robots.
+        steps_per_robot: control steps of experience with each of them, collected in `num_envs` environments.
+        """
+        config = run.config
+        env_steps = steps_per_robot * pool.num_robots
+        self._num_robots = pool.num_robots
+        self._num_iterations = max(1, round(env_steps / config.batch_size))
+        self._key = jax.random.fold_in(jax.random.key(config.seed), _FIT)
+        self._ppo = PPO(
+            run.make_env(pool),
+            Embedding(pool.num_robots, config.embedding.size, config.embedding.initial_scale),
+            config.ppo,
+            dataclasses.replace(config.embedding, settle_steps=env_steps),
+            config.resolved_num_envs,
+            self._num_iterations,
+            train_network=False,
+        )
+
+    def __call__(self, state: PPOState) -> jax.Array:
+        """v_h of the new robots under the networks of `state`, which is left as it is: [num_robots, K]."""
+        params = {
             "network": copy_tree(state.params["network"]),
-            "embedding": jnp.tile(state.params["embedding"].mean(axis=0), (pool.num_robots, 1)),
-        },
-        obs_statistics=copy_tree(state.obs_statistics),
-        delta_statistics=copy_tree(state.delta_statistics),
-    )
-    return ppo.train(fit_state, num_iterations).params["embedding"]
+            "embedding": jnp.tile(state.params["embedding"].mean(axis=0), (self._num_robots, 1)),
+        }
+        fit_state = self._ppo.init(self._key).replace(
+            params=params,
+            obs_statistics=copy_tree(state.obs_statistics),
+            delta_statistics=copy_tree(state.delta_statistics),
+        )
+        return self._ppo.train(fit_state, self._num_iterations).params["embedding"]
 
 
 def copy_tree(tree):

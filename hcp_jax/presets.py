@@ -6,7 +6,9 @@ from hcp_jax.config import Config, EmbeddingConfig, HopperConfig, PPOConfig
 
 # Many environments, short unrolls: one environment per robot, 32 steps each. Rewards are scaled so that value targets are
 # of order 1, observations are whitened, the step size decays, and physics is integrated by Euler at 2 ms instead of RK4
-# (about 3 times faster).
+# (about 3 times faster). The horizon is 200 steps instead of 100: at gamma 0.99 what PPO learned hung on its seed (returns of
+# 1,300 and 2,900 after 10 M steps; at 0.995 2,200 and 2,000 after 8 M), and kinematics + dynamics reached 3,300 in 20 M steps
+# where it now reaches 4,200 in 5 M.
 FAST_PPO = PPOConfig(
     preset="fast",
     unroll_length=32,
@@ -14,6 +16,7 @@ FAST_PPO = PPOConfig(
     num_minibatches=32,
     learning_rate=3e-4,
     final_learning_rate=3e-5,
+    gamma=0.995,
     value_clip_eps=0.0,
     entropy_cost=0.0,
     normalize_observation=True,

@@ -8,7 +8,7 @@ import numpy as np
 from hcp_jax.algorithms.ppo import PPOState
 from hcp_jax.envs.episodes import Episodes, Evaluator
 from hcp_jax.evaluation.statistics import robot_rows, summarise_trials
-from hcp_jax.experiment import Experiment, fit_embedding, heldout_v_h, make_experiment, make_heldout_pool, train_v_h
+from hcp_jax.experiment import EmbeddingFitter, Experiment, heldout_v_h, make_experiment, make_heldout_pool, train_v_h
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.training import run_folder
 from hcp_jax.training.warm_start import load_state
@@ -33,7 +33,7 @@ def evaluate_folder(
         folder: a run folder.
         trials, robots_per_trial: numbers of trials and of robots in each.
         physics: engine, may be `native-INTEGRATOR`.
-        fit_steps: control steps for fitting; None takes the config's.
+        fit_steps: control steps of each new robot for fitting; None takes the config's.
         seed: seed of the episodes' initial states.
         best: take the checkpoint with the highest return on training robots.
 
@@ -53,8 +53,8 @@ def evaluate_folder(
     sets["heldout"] = (heldout, np.arange(count), heldout_v_h(run, state.params, heldout))
     fit_steps = config.embedding.fit_steps if fit_steps is None else fit_steps
     if run.ppo.conditioning.is_learned and fit_steps:
-        print(f"fitting v_h of {count} new robots for {fit_steps:,} control steps, networks frozen", flush=True)
-        sets["heldout_fitted"] = (heldout, np.arange(count), fit_embedding(run, state, heldout, fit_steps))
+        print(f"fitting v_h of {count} new robots, {fit_steps:,} control steps of each, networks frozen", flush=True)
+        sets["heldout_fitted"] = (heldout, np.arange(count), EmbeddingFitter(run, heldout, fit_steps)(state))
     record = {
         "run": str(folder),
         "task": config.task,

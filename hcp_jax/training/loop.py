@@ -19,7 +19,7 @@ import numpy as np
 from hcp_jax.algorithms.ppo import PPOState, zero_sums
 from hcp_jax.config import Config
 from hcp_jax.envs.episodes import Episodes
-from hcp_jax.experiment import Experiment, evaluate_run, fit_embedding, make_experiment
+from hcp_jax.experiment import EmbeddingFitter, Experiment, evaluate_run, make_experiment
 from hcp_jax.physics.base import PhysicsOverflowError
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import Checkpoints
@@ -97,6 +97,9 @@ class TrainingLoop:
         self._batch_size = config.batch_size
         self._chunk = max(1, round(_CHUNK_ENV_STEPS / self._batch_size))
         self._eval_iterations = max(1, round(config.eval_every / self._batch_size))
+        self._fitter = None
+        if run.ppo.conditioning.is_learned and config.embedding.fit_steps:
+            self._fitter = EmbeddingFitter(run, run.heldout_pool, config.embedding.fit_steps)
         self._metrics = MetricsWriter(folder, self._env_steps)
         self._progress = Progress(run.num_iterations * self._batch_size, self._env_steps)
 
@@ -132,11 +135,7 @@ class TrainingLoop:
     def _evaluate(self, state: PPOState) -> tuple[PPOState, dict[str, float]]:
         run = self._run
         trained, heldout = evaluate_run(run, state)
-        fitted = None
-        fit_steps = run.config.embedding.fit_steps
-        if self._iteration == run.num_iterations and run.ppo.conditioning.is_learned and fit_steps:
-            self._progress.say("fitting v_h of the held-out robots, networks frozen")
-            fitted = evaluate_run(run, state, fit_embedding(run, state, run.heldout_pool, fit_steps))[1]
+        fitted = evaluate_run(run, state, self._fitter(state))[1] if self._fitter else None
         metrics = {"env_steps": self._env_steps, **summarise(trained, heldout, fitted), **learner_metrics(state)}
         timing = {
             "env_steps": self._env_steps,
