@@ -1,4 +1,4 @@
-"""`python -m hcp_jax.collect RUNS --out results/hopper`: publishes tables, curves and pictures from run folders."""
+"""`python -m hcp_jax.collect RUNS --out results`: publishes tables, curves, pictures and policies from run folders."""
 
 import pathlib
 

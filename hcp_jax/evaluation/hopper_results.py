@@ -11,36 +11,54 @@ from hcp_jax.evaluation.embedding import knn_r2, plot_embedding
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.summary import read_curve, read_run_commit, steps_to_reach, summarise_runs
 from hcp_jax.experiment import make_experiment
-from hcp_jax.training.metrics import METRICS_FILE
+from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE
+from hcp_jax.training.policy_file import write_policy
 from hcp_jax.training.run_folder import CONFIG_FILE, ENVIRONMENT_FILE, read_config
 from hcp_jax.training.warm_start import load_state
 
 
-def collect(runs: pathlib.Path, out: pathlib.Path) -> list[str]:
-    """Writes `out` from the run folders under `runs`; returns a line for each thing written.
+def collect(runs: pathlib.Path, results: pathlib.Path) -> list[str]:
+    """Writes into `results` from the run folders under `runs`; returns a line for each thing written.
 
-    `summary.json` (a row per algorithm), `curves.png`, each run's `metrics.csv`, config and environment under `runs/`,
-    `finetune.json` and `finetune.png` if there are `hopper_finetune` runs, `embedding.json` and `embedding.png` if
-    there is a `hopper_embedding` run.
+    `hopper/summary.json` (a row per algorithm), `hopper/curves.png`, each run's metrics under `hopper/runs/` and its policy
+    under `policies/`, `hopper/finetune.json` and `.png` if there are `hopper_finetune` runs, `hopper/embedding.json` and
+    `.png` if there is a `hopper_embedding` run.
     """
+    out = results / "hopper"
     folders = sorted(path.parent for path in runs.glob(f"*/{CONFIG_FILE}") if (path.parent / METRICS_FILE).exists())
     by_name: dict[str, list[pathlib.Path]] = {}
     for folder in folders:
         by_name.setdefault(read_config(folder).name, []).append(folder)
-        copy = out / "runs" / folder.name
-        copy.mkdir(parents=True, exist_ok=True)
-        for name in (CONFIG_FILE, ENVIRONMENT_FILE, METRICS_FILE, "timing.csv"):
-            shutil.copy(folder / name, copy / name)
+        copy_files(folder, out / "runs" / folder.name, (CONFIG_FILE, ENVIRONMENT_FILE, METRICS_FILE, TIMING_FILE))
+    for group in by_name.values():
+        publish_policies(group, results / "policies")
+    written = [f"{results}/policies: {', '.join(folder.name for folder in folders)}"]
     special = ("hopper_finetune", "hopper_embedding")
-    main = {name: folders for name, folders in by_name.items() if name not in special}
-    write_json(out / "summary.json", summarise_runs([folder for folders in main.values() for folder in folders]))
-    plot_groups(main, out / "curves.png", ("train_return_mean", "heldout_return_mean"))
-    written = [f"{out}/summary.json, {out}/curves.png: {', '.join(main)}"]
+    main = {name: group for name, group in by_name.items() if name not in special}
+    if main:
+        write_json(out / "summary.json", summarise_runs([folder for group in main.values() for folder in group]))
+        plot_groups(main, out / "curves.png", ("train_return_mean", "heldout_return_mean"))
+        written.append(f"{out}/summary.json, {out}/curves.png: {', '.join(main)}")
     if "hopper_finetune" in by_name:
         written.append(write_finetune(by_name["hopper_finetune"], out))
     if "hopper_embedding" in by_name:
         written.append(write_embedding(by_name["hopper_embedding"][0], out))
     return written
+
+
+def copy_files(source: pathlib.Path, target: pathlib.Path, names: Sequence[str]) -> None:
+    target.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        shutil.copy(source / name, target / name)
+
+
+def publish_policies(folders: Sequence[pathlib.Path], policies: pathlib.Path) -> None:
+    """Writes the newest policy of each of these runs, which differ in their seed alone, to a folder under `policies`."""
+    run = make_experiment(read_config(folders[0]))
+    for folder in folders:
+        target = policies / folder.name
+        copy_files(folder, target, (CONFIG_FILE, ENVIRONMENT_FILE))
+        write_policy(target, *load_state(folder, run))
 
 
 def plot_groups(groups: Mapping[str, Sequence[pathlib.Path]], path: pathlib.Path, columns: Sequence[str]) -> None:

@@ -2,6 +2,7 @@
 
 import logging
 import pathlib
+from collections.abc import Mapping
 
 import jax
 import orbax.checkpoint as ocp
@@ -101,16 +102,21 @@ class Checkpoints:
 
     def _check_architecture(self, manager: ocp.CheckpointManager, template: PPOState, iteration: int) -> None:
         metadata = manager.item_metadata(iteration).state
-        saved = {_name(path): tuple(leaf.shape) for path, leaf in jax.tree_util.tree_leaves_with_path(metadata.tree)
+        saved = {leaf_name(path): tuple(leaf.shape) for path, leaf in jax.tree_util.tree_leaves_with_path(metadata.tree)
                  if hasattr(leaf, "shape")}  # fmt: skip
-        for path, leaf in jax.tree_util.tree_leaves_with_path(template.params):
-            name = "params/" + _name(path)
-            if name not in saved:
-                raise CheckpointError(f"{self.folder}/{iteration}: another architecture: it has no {name}")
-            if saved[name] != leaf.shape:
-                shapes = f"{name} is {saved[name]}, the config asks for {leaf.shape}"
-                raise CheckpointError(f"{self.folder}/{iteration}: another architecture: {shapes}")
+        check_architecture(saved, template, f"{self.folder}/{iteration}")
 
 
-def _name(path) -> str:
+def check_architecture(saved: Mapping[str, tuple[int, ...]], template: PPOState, where: str) -> None:
+    """Raises CheckpointError unless `saved`, shapes by name, has every parameter of `template` in its shape."""
+    for path, leaf in jax.tree_util.tree_leaves_with_path(template.params):
+        name = "params/" + leaf_name(path)
+        if name not in saved:
+            raise CheckpointError(f"{where}: another architecture: it has no {name}")
+        if saved[name] != leaf.shape:
+            raise CheckpointError(f"{where}: another architecture: {name} is {saved[name]}, the config asks for {leaf.shape}")
+
+
+def leaf_name(path) -> str:
+    """A leaf's place in its pytree: `params/network/...`."""
     return "/".join(str(getattr(key, "key", getattr(key, "name", getattr(key, "idx", key)))) for key in path)

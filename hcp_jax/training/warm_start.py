@@ -10,12 +10,18 @@ from hcp_jax.config import Config
 from hcp_jax.experiment import Experiment, copy_tree, make_experiment
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
+from hcp_jax.training.policy_file import POLICY_FILE, read_policy
 
 
 def load_state(folder: pathlib.Path, run: Experiment, best: bool = False) -> tuple[int, PPOState]:
-    """The newest readable state of a run folder, or its best one, and its number of iterations."""
+    """The newest readable state of a run folder, or its best one, and its number of iterations.
+
+    A published policy (a folder with `policy.msgpack` instead of checkpoints) gives an initial state with that policy.
+    """
     checkpoint_folder = folder / run_folder.CHECKPOINT_FOLDER
     if not checkpoint_folder.is_dir():
+        if (folder / POLICY_FILE).exists():
+            return read_policy(folder, run.init_state())
         raise CheckpointError(f"{folder}: holds no checkpoint")
     checkpoints = Checkpoints(checkpoint_folder, read_only=True)
     try:

@@ -1,11 +1,14 @@
 import dataclasses
 import json
+import shutil
 
 import pytest
 
 from hcp_jax import collect, sweep
 from hcp_jax.config import to_dict
 from hcp_jax.evaluation.summary import read_curve, steps_to_reach
+from hcp_jax.evaluation.sweeps import evaluate_folder
+from hcp_jax.training.checkpoint import CheckpointError
 from hcp_jax.training.metrics import MetricsWriter
 
 
@@ -42,12 +45,36 @@ def test_a_sweep_skips_what_is_done(swept, capsys):
     assert (swept / "runs" / "with_s1" / "metrics.csv").stat().st_mtime_ns == before
 
 
-def test_collected_results_come_from_the_run_folders(swept):
+@pytest.fixture(scope="module")
+def collected(swept):
     collect.main([str(swept / "runs"), "--out", str(swept / "results")])
-    assert (swept / "results" / "curves.png").read_bytes().startswith(b"\x89PNG")
-    copy = swept / "results" / "runs" / "with_s0" / "metrics.csv"
+
+
+def test_collected_results_come_from_the_run_folders(swept, collected):
+    results = swept / "results" / "hopper"
+    assert (results / "curves.png").read_bytes().startswith(b"\x89PNG")
+    copy = results / "runs" / "with_s0" / "metrics.csv"
     assert copy.read_bytes() == (swept / "runs" / "with_s0" / "metrics.csv").read_bytes()
-    assert len(json.loads((swept / "results" / "summary.json").read_text())) == 2
+    assert len(json.loads((results / "summary.json").read_text())) == 2
+
+
+def test_a_published_policy_earns_what_its_run_earns(swept, collected):
+    records = [evaluate_folder(folder / "with_s1", 1, 4) for folder in (swept / "runs", swept / "results" / "policies")]
+    assert records[0]["sets"] == records[1]["sets"]
+    assert set(records[0]["sets"]) == {"train", "heldout", "heldout_fitted"}
+
+
+def test_a_damaged_policy_and_one_of_another_architecture_are_refused(swept, collected, tmp_path, capsys):
+    folder = tmp_path / "policy"
+    shutil.copytree(swept / "results" / "policies" / "with_s0", folder)
+    config = json.loads((folder / "config.json").read_text())
+    (folder / "config.json").write_text(json.dumps(config | {"encoding": "none"}))
+    with pytest.raises(CheckpointError, match=r"another architecture: .*policy/hidden_0/kernel is \(14, 8\)"):
+        evaluate_folder(folder, 1, 4)
+    (folder / "config.json").write_text(json.dumps(config))
+    (folder / "policy.msgpack").write_bytes((folder / "policy.msgpack").read_bytes()[:1000])
+    with pytest.raises(CheckpointError, match=r"policy\.msgpack: damaged"):
+        evaluate_folder(folder, 1, 4)
 
 
 def test_collecting_nothing_is_an_error(tmp_path, capsys):
