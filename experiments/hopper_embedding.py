@@ -14,5 +14,5 @@ def get_config() -> Config:
         total_env_steps=5_000_000,
         eval_every=1_000_000,
         pool=PoolConfig(ranges=torso_mass_only()),
-        embedding=dataclasses.replace(presets.GROUNDED_EMBEDDING, size=2, fit_steps=0),
+        embedding=dataclasses.replace(presets.IDENTIFIED_EMBEDDING, size=2, fit_steps=0),
     )

@@ -16,5 +16,5 @@ def get_config() -> Config:
         num_envs=1000,
         init="runs/hopper_hcpi",
         pool=PoolConfig(num_robots=100, split="new"),
-        embedding=presets.GROUNDED_EMBEDDING,
+        embedding=presets.IDENTIFIED_EMBEDDING,
     )

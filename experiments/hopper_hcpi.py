@@ -5,4 +5,4 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.hopper("hopper_hcpi", encoding="embedding", embedding=presets.GROUNDED_EMBEDDING)
+    return presets.hopper("hopper_hcpi", encoding="embedding", embedding=presets.IDENTIFIED_EMBEDDING)

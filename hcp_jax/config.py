@@ -130,18 +130,18 @@ class PPOConfig:
 
 @dataclasses.dataclass(frozen=True)
 class EmbeddingConfig:
-    """The learned v_h of HCP-I. The defaults are the paper's plain form.
+    """The learned v_h of HCP-I.
+
+    With `identify_steps` at 0, the paper's form, v_h learns from the gradients of policy and value loss. Above 0 a run starts
+    by identifying its robots: v_h learns what a forward model needs to predict the next observation, while the policy learns
+    without it. v_h is then standardised over the robots and stands still, and the policy starts afresh with it.
 
     Attributes:
         size: width of v_h (paper: 32).
         initial_scale: standard deviation of its initial values.
-        learning_rate: Adam's step for the embedding, decayed like the networks'.
-        prediction_cost: weight of the loss of a forward model that predicts the next observation from observation, action and
-            v_h; its gradient grounds v_h in the robot's dynamics. 0 leaves the model out.
-        model_learning_rate: Adam's step for the forward model, decayed like the networks'.
-        settle_steps: control steps after which embedding and forward model keep a fiftieth of their step size, so that the
-            policy sees a v_h that stands still; 0 decays them like the networks.
-        policy_gradient: whether the gradients of policy and value loss reach v_h.
+        learning_rate: Adam's step for the embedding, decayed like the networks' or to 0 over the identification.
+        model_learning_rate: Adam's step for the forward model, decayed to 0 over the identification.
+        identify_steps: control steps of identification; rounded to whole iterations.
         fit_steps: control steps of each held-out robot for fitting its v_h at every evaluation, with the networks frozen; 0
             does not fit.
     """
@@ -149,24 +149,16 @@ class EmbeddingConfig:
     size: int = 32
     initial_scale: float = 0.05
     learning_rate: float = 1e-3
-    prediction_cost: float = 0.0
     model_learning_rate: float = 1e-3
-    settle_steps: int = 0
-    policy_gradient: bool = True
+    identify_steps: int = 0
     fit_steps: int = 3_200
 
     def __post_init__(self):
         _require(self.size >= 1, "embedding.size", self.size, "at least 1")
         for name in ("learning_rate", "model_learning_rate"):
             _require(_positive(getattr(self, name)), f"embedding.{name}", getattr(self, name), "a number above 0")
-        for name in ("initial_scale", "prediction_cost", "settle_steps", "fit_steps"):
+        for name in ("initial_scale", "identify_steps", "fit_steps"):
             _require(_at_least_zero(getattr(self, name)), f"embedding.{name}", getattr(self, name), "a number of at least 0")
-        _require(
-            self.policy_gradient or self.prediction_cost > 0,
-            "embedding.policy_gradient",
-            self.policy_gradient,
-            "True unless embedding.prediction_cost is above 0",
-        )
 
 
 @dataclasses.dataclass(frozen=True)

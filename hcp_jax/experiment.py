@@ -70,6 +70,7 @@ def make_experiment(config: Config, physics: str | None = None) -> Experiment:
         config.embedding,
         config.resolved_num_envs,
         num_iterations,
+        train_forward_model=not config.init,
     )
     num_evaluated = min(config.eval_robots, train_pool.num_robots, heldout_pool.num_robots)
     rows = np.arange(num_evaluated)
@@ -115,7 +116,7 @@ def evaluate_run(run: Experiment, state: PPOState, heldout: jax.Array | None = N
     """One deterministic episode of each evaluated robot: those trained on, and held-out ones with v_h `heldout` [M, K]."""
     count = run.num_evaluated
     heldout = heldout_v_h(run, state.params) if heldout is None else heldout
-    v_h = jnp.concatenate([train_v_h(run, state.params)[:count], heldout[:count]])
+    v_h = run.ppo.visible(state, jnp.concatenate([train_v_h(run, state.params)[:count], heldout[:count]]))
     policy_params = (state.params["network"], state.obs_statistics)
     episodes = run.evaluator(policy_params, v_h, np.arange(2 * count), jax.random.key(_EVALUATION_SEED))
     return episodes.take(slice(0, count)), episodes.take(slice(count, None))
@@ -124,7 +125,8 @@ def evaluate_run(run: Experiment, state: PPOState, heldout: jax.Array | None = N
 class EmbeddingFitter:
     """Learns v_h of a pool's robots from their experience, with the networks frozen (paper, section 5.2, made honest).
 
-    Starts from the mean embedding of the training robots and runs the training's own objective.
+    It does what gave the training robots theirs, starting from their mean: v_h is identified while the policy acts on the
+    mean, or learns from policy and value loss.
     """
 
     def __init__(self, run: Experiment, pool: RobotPool, steps_per_robot: int):
@@ -142,22 +144,20 @@ class EmbeddingFitter:
             run.make_env(pool),
             Embedding(pool.num_robots, config.embedding.size, config.embedding.initial_scale),
             config.ppo,
-            dataclasses.replace(config.embedding, settle_steps=env_steps),
+            dataclasses.replace(config.embedding, identify_steps=env_steps if run.ppo.identify_iterations else 0),
             config.resolved_num_envs,
             self._num_iterations,
             train_network=False,
+            train_forward_model=False,
         )
 
     def __call__(self, state: PPOState) -> jax.Array:
         """v_h of the new robots under the networks of `state`, which is left as it is: [num_robots, K]."""
-        params = {
-            "network": copy_tree(state.params["network"]),
-            "embedding": jnp.tile(state.params["embedding"].mean(axis=0), (self._num_robots, 1)),
-        }
+        mean = jnp.tile(state.params["embedding"].mean(axis=0), (self._num_robots, 1))
         fit_state = self._ppo.init(self._key).replace(
-            params=params,
+            params={"network": copy_tree(state.params["network"]), "embedding": mean},
             obs_statistics=copy_tree(state.obs_statistics),
-            delta_statistics=copy_tree(state.delta_statistics),
+            model_statistics=copy_tree(state.model_statistics),
         )
         return self._ppo.train(fit_state, self._num_iterations).params["embedding"]
 

@@ -23,12 +23,10 @@ FAST_PPO = PPOConfig(
     reward_scale=0.05,
 )
 FAST_HOPPER = HopperConfig(integrator="euler")
-# HCP-I grounded in dynamics: a narrow v_h that learns from a forward model alone and settles early, so that policy and value
-# function see one that stands still. The paper's plain form (32 wide, from the gradients of policy and value loss) is
+# HCP-I that identifies its robots first (2,000 steps of each): a narrow v_h from a forward model, standardised and still
+# from then on. The paper's plain form (32 wide, from the gradients of policy and value loss, drifting under the policy) is
 # `EmbeddingConfig()`.
-GROUNDED_EMBEDDING = EmbeddingConfig(
-    size=8, learning_rate=5e-3, prediction_cost=1.0, policy_gradient=False, settle_steps=3_000_000
-)
+IDENTIFIED_EMBEDDING = EmbeddingConfig(size=8, learning_rate=5e-3, identify_steps=2_000_000)
 # The paper's run: 8 environments, whole episodes, RK4.
 PAPER_NUM_ENVS = 8
 

@@ -37,7 +37,7 @@ def tiny_config() -> Config:
         pool=PoolConfig(num_robots=8, num_heldout=4),
         env=HopperConfig(episode_length=24, integrator="euler"),
         ppo=PPOConfig(unroll_length=8, num_minibatches=2, num_epochs=2, hidden_sizes=(8, 8), normalize_observation=True),
-        embedding=EmbeddingConfig(size=3, fit_steps=16),
+        embedding=EmbeddingConfig(size=3, identify_steps=192, fit_steps=16),
     )
 
 

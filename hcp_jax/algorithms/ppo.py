@@ -4,10 +4,16 @@ train(state, n):                         one jitted call, buffers donated
   for each of n iterations:
     collect                              num_envs x unroll_length control steps
     compute_advantages                   GAE with termination and truncation apart
-    for each epoch, each minibatch:      clipped surrogate + value + entropy (+ forward model), Adam
+    for each epoch, each minibatch:      clipped surrogate + value + entropy, Adam
                                          networks and embedding have their own step sizes
+
+With `embedding.identify_steps` the first iterations also identify the robots: policy and value function see zeros for v_h,
+while embedding and forward model reduce the error of predicting the next observation. Then both start afresh and see v_h,
+which stands still from there on.
 """
 
+import functools
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import jax
@@ -16,6 +22,11 @@ import optax
 from brax.training.acme import running_statistics, specs
 from flax import struct
 
+from hcp_jax.algorithms.identification import (
+    forward_model_variables,
+    prediction_loss,
+    standardize_embedding,
+)
 from hcp_jax.algorithms.returns import compute_gae
 from hcp_jax.config import EmbeddingConfig, PPOConfig
 from hcp_jax.envs.base import EnvState, Transition
@@ -23,8 +34,6 @@ from hcp_jax.policies.conditioning import Conditioning
 from hcp_jax.policies.distribution import gaussian_entropy, gaussian_log_prob, sample_gaussian
 from hcp_jax.policies.networks import ActorCritic
 
-# Share of their first step size that embedding and forward model keep once settled.
-SETTLED = 0.02
 Params = dict[str, Any]  # {"network": ..., "embedding": [N, K] or None}
 
 
@@ -59,14 +68,16 @@ class Batch:
 class PPOState:
     """Everything that training carries from one iteration to the next.
 
-    diverged: [N] int32 episodes that each robot lost to non-finite physics; overflow: [] int32 worlds that ever overflowed;
-    sums: running sums of metrics since they were last read.
+    iteration: [] int32 iterations done; model_statistics: of [obs, change of obs], the forward model's units, which stand
+    still after the identification; diverged: [N] int32 episodes that each robot lost to non-finite physics; overflow: []
+    int32 worlds that ever overflowed; sums: running sums of metrics since they were last read.
     """
 
+    iteration: jax.Array
     params: Any
     opt_state: optax.OptState
     obs_statistics: running_statistics.RunningStatisticsState
-    delta_statistics: running_statistics.RunningStatisticsState
+    model_statistics: running_statistics.RunningStatisticsState
     env_state: EnvState
     key: jax.Array
     diverged: jax.Array
@@ -94,6 +105,7 @@ class PPO:
         num_envs: int,
         num_iterations: int,
         train_network: bool = True,
+        train_forward_model: bool = True,
     ):
         """Args:
         env: a vectorised environment over a pool.
@@ -101,41 +113,45 @@ class PPO:
         config, embedding: settings; `num_minibatches` must divide `num_envs * unroll_length`.
         num_envs: parallel environments.
         num_iterations: length of the run, for the learning rate's decay.
-        train_network: False freezes the networks and trains the embedding alone.
+        train_network: False freezes policy and value function, and the observation statistics.
+        train_forward_model: False freezes the forward model, its statistics and so what v_h means.
         """
         self.env, self.conditioning, self.config, self.embedding = env, conditioning, config, embedding
-        self.num_envs, self._train_network = num_envs, train_network
-        self._predicts = conditioning.is_learned and embedding.prediction_cost > 0
+        self.num_envs = num_envs
+        self._train_network, self._train_forward_model = train_network, train_forward_model
+        self.identify_iterations = 0
+        if conditioning.is_learned and embedding.identify_steps:
+            self.identify_iterations = max(1, round(embedding.identify_steps / (num_envs * config.unroll_length)))
         self.network = ActorCritic(
-            env.action_size, env.observation_size, config.hidden_sizes, config.initial_log_std, self._predicts
+            env.action_size, env.observation_size, config.hidden_sizes, config.initial_log_std, self.identify_iterations > 0
         )
         self._optimizer = self._make_optimizer(num_iterations)
         self.train = jax.jit(self._train, donate_argnums=0)
 
     def _make_optimizer(self, num_iterations: int) -> optax.GradientTransformation:
         config = self.config
-        num_updates = num_iterations * config.num_epochs * config.num_minibatches
+        updates_per_iteration = config.num_epochs * config.num_minibatches
         decay = config.final_learning_rate / config.learning_rate
 
+        def until_the_end(rate: float) -> optax.Schedule:
+            updates = (num_iterations - self.identify_iterations) * updates_per_iteration
+            return optax.linear_schedule(rate, rate * decay, max(1, updates))
+
+        def while_identifying(rate: float) -> optax.Schedule:
+            updates = self.identify_iterations * updates_per_iteration
+            # Exactly 0 in the end, which optax's linear schedule is not.
+            return lambda count: jnp.where(jnp.asarray(count) < updates, rate * (1.0 - count / updates), 0.0)
+
+        schedule = while_identifying if self.identify_iterations else until_the_end
         clip = optax.clip_by_global_norm(config.max_grad_norm)
-        rate = optax.linear_schedule(config.learning_rate, config.final_learning_rate, num_updates)
-        network = optax.chain(clip, optax.adam(rate, eps=1e-5))
-        final, updates = decay, num_updates
-        if self.embedding.settle_steps:
-            settle_iterations = self.embedding.settle_steps / (self.num_envs * config.unroll_length)
-            final, updates = SETTLED, max(1, round(settle_iterations * config.num_epochs * config.num_minibatches))
-
-        def settling(learning_rate: float) -> optax.Schedule:
-            return optax.linear_schedule(learning_rate, learning_rate * final, updates)
-
-        model = optax.chain(clip, optax.adam(settling(self.embedding.model_learning_rate), eps=1e-5))
+        network = optax.chain(clip, optax.adam(until_the_end(config.learning_rate), eps=1e-5))
+        model = optax.chain(clip, optax.adam(schedule(self.embedding.model_learning_rate), eps=1e-5))
         # A row's gradient is its robot's share of a minibatch, so it is tiny: no clipping, a small eps.
-        embedding = optax.adam(settling(self.embedding.learning_rate), eps=1e-8)
-        frozen = optax.set_to_zero()
+        embedding = optax.adam(schedule(self.embedding.learning_rate), eps=1e-8)
         return optax.multi_transform(
             {
-                "network": network if self._train_network else frozen,
-                "forward_model": model if self._train_network else frozen,
+                "network": network if self._train_network else optax.set_to_zero(),
+                "forward_model": model if self._train_forward_model else optax.set_to_zero(),
                 "embedding": embedding,
             },
             label_params,
@@ -153,10 +169,11 @@ class PPO:
         params = self.init_params(key_params)
         spec = specs.Array((self.env.observation_size,), jnp.float32)
         return PPOState(
+            iteration=jnp.int32(0),
             params=params,
             opt_state=self._optimizer.init(params),
             obs_statistics=running_statistics.init_state(spec),
-            delta_statistics=running_statistics.init_state(spec),
+            model_statistics=running_statistics.init_state(specs.Array((2 * self.env.observation_size,), jnp.float32)),
             env_state=self.env.reset(key_env, self.env.initial_index(key_index, self.num_envs)),
             key=key,
             diverged=jnp.zeros(self.env.num_robots, jnp.int32),
@@ -184,14 +201,23 @@ class PPO:
         key, key_collect, key_update = jax.random.split(state.key, 3)
         env_state, (transitions, log_prob, action) = self._collect(state, key_collect)
         batch, episode_sums = self._make_batch(state, transitions, log_prob, action)
-        params, opt_state, losses = self._update(state, batch, key_update)
-        deltas = (transitions.next_obs - transitions.obs).reshape(-1, self.env.observation_size)
-        sums = {"iterations": jnp.ones(()), **episode_sums, **{k: jnp.mean(v) for k, v in losses.items()}}
+        if self.identify_iterations:
+            identifies = state.iteration < self.identify_iterations
+            params, opt_state, model_statistics, losses = jax.lax.cond(
+                identifies, self._learn_and_identify, self._learn, state, batch, key_update
+            )
+        else:
+            params, opt_state, model_statistics, losses = self._learn(state, batch, key_update)
+        obs_statistics = state.obs_statistics
+        if self._train_network:
+            obs_statistics = running_statistics.update(obs_statistics, batch.obs)
+        sums = {"iterations": jnp.ones(()), **episode_sums, **losses}
         return PPOState(
+            iteration=state.iteration + 1,
             params=params,
             opt_state=opt_state,
-            obs_statistics=self._update_statistics(state.obs_statistics, batch.obs),
-            delta_statistics=self._update_statistics(state.delta_statistics, deltas),
+            obs_statistics=obs_statistics,
+            model_statistics=model_statistics,
             env_state=env_state,
             key=key,
             diverged=state.diverged.at[transitions.index].add(transitions.diverged.astype(jnp.int32)),
@@ -199,14 +225,55 @@ class PPO:
             sums={name: state.sums[name] + sums[name] for name in SUMS},
         )
 
-    def _update_statistics(self, statistics: running_statistics.RunningStatisticsState, rows: jax.Array):
-        return running_statistics.update(statistics, rows) if self._train_network else statistics
+    def _learn(self, state: PPOState, batch: Batch, key: jax.Array):
+        """One iteration's updates of policy and value function, and of the embedding unless it was identified."""
+        params, opt_state, losses = self._update(state, batch, key, self._ppo_loss)
+        return params, opt_state, state.model_statistics, losses | {"prediction_loss": jnp.zeros(())}
+
+    def _learn_and_identify(self, state: PPOState, batch: Batch, key: jax.Array):
+        """The same with embedding and forward model; after the last such iteration the policy starts afresh."""
+        if self._train_forward_model:
+            variables = forward_model_variables(batch.obs, batch.next_obs)
+            state = state.replace(model_statistics=running_statistics.update(state.model_statistics, variables))
+
+        def loss(params: Params, minibatch: Batch, state: PPOState) -> tuple[jax.Array, dict]:
+            ppo_loss, metrics = self._ppo_loss(params, minibatch, state)
+            error = prediction_loss(
+                functools.partial(self._apply, params["network"], method="predict"),
+                forward_model_variables(minibatch.obs, minibatch.next_obs),
+                state.model_statistics,
+                minibatch.executed_action,
+                self.conditioning.v_h(params["embedding"], minibatch.index),
+            )
+            return ppo_loss + error, metrics | {"prediction_loss": error}
+
+        params, opt_state, losses = self._update(state, batch, key, loss)
+        if self._train_forward_model:
+            is_last = state.iteration + 1 == self.identify_iterations
+            params, opt_state = jax.lax.cond(is_last, self._restart, lambda *learned: learned[:2], params, opt_state, key)
+        return params, opt_state, state.model_statistics, losses
+
+    def _restart(self, params: Params, opt_state: optax.OptState, key: jax.Array):
+        """A standardised embedding, and policy and value function as they were before they learned."""
+        params = standardize_embedding(params)
+        fresh = self.init_params(key)
+        forward_model = params["network"]["params"]["forward_model"]
+        network = {"params": fresh["network"]["params"] | {"forward_model": forward_model}}
+        inner_states = self._optimizer.init(fresh).inner_states
+        inner_states = opt_state.inner_states | {"network": inner_states["network"]}
+        return {"network": network, "embedding": params["embedding"]}, opt_state._replace(inner_states=inner_states)
+
+    def visible(self, state: PPOState, v_h: jax.Array) -> jax.Array:
+        """v_h [..., K] as policy and value function see it: zeros as long as the robots are being identified."""
+        if not self.identify_iterations:
+            return v_h
+        return jnp.where(state.iteration < self.identify_iterations, 0.0, jax.lax.stop_gradient(v_h))
 
     def _collect(self, state: PPOState, key: jax.Array):
         """Rolls the current policy out: transitions, log_prob, sampled action, each [T, B, ...]."""
 
         def step(env_state, key_action):
-            v_h = self.conditioning.v_h(state.params["embedding"], env_state.index)
+            v_h = self.visible(state, self.conditioning.v_h(state.params["embedding"], env_state.index))
             obs = self.normalize(env_state.obs, state.obs_statistics)
             mean, log_std = self._apply(state.params["network"], obs, v_h, method="act")
             action = sample_gaussian(mean, log_std, key_action)
@@ -218,7 +285,7 @@ class PPO:
 
     def _make_batch(self, state: PPOState, transitions: Transition, log_prob, action) -> tuple[Batch, dict]:
         config = self.config
-        v_h = self.conditioning.v_h(state.params["embedding"], transitions.index)
+        v_h = self.visible(state, self.conditioning.v_h(state.params["embedding"], transitions.index))
         obs = self.normalize(transitions.obs, state.obs_statistics)
         next_obs = self.normalize(transitions.next_obs, state.obs_statistics)
         value = self._apply(state.params["network"], obs, v_h, method="value")
@@ -254,13 +321,14 @@ class PPO:
         num_samples = self.num_envs * config.unroll_length
         return jax.tree.map(lambda x: x.reshape(num_samples, *x.shape[2:]), batch), sums
 
-    def _update(self, state: PPOState, batch: Batch, key: jax.Array):
+    def _update(self, state: PPOState, batch: Batch, key: jax.Array, loss: Callable):
+        """Epochs of minibatches. `loss(params, minibatch, state)` gives a loss and its metrics."""
         num_samples = batch.obs.shape[0]
 
         def minibatch_step(carry, rows):
             params, opt_state = carry
             minibatch = jax.tree.map(lambda x: x[rows], batch)
-            grads, metrics = jax.grad(self._loss, has_aux=True)(params, minibatch, state)
+            grads, metrics = jax.grad(loss, has_aux=True)(params, minibatch, state)
             updates, opt_state = self._optimizer.update(grads, opt_state, params)
             return (optax.apply_updates(params, updates), opt_state), metrics
 
@@ -270,40 +338,26 @@ class PPO:
 
         keys = jax.random.split(key, self.config.num_epochs)
         (params, opt_state), metrics = jax.lax.scan(epoch, (state.params, state.opt_state), keys)
-        return params, opt_state, metrics
+        return params, opt_state, jax.tree.map(jnp.mean, metrics)
 
-    def _loss(self, params: Params, batch: Batch, state: PPOState) -> tuple[jax.Array, dict]:
+    def _ppo_loss(self, params: Params, batch: Batch, state: PPOState) -> tuple[jax.Array, dict]:
         config = self.config
-        v_h = self.conditioning.v_h(params["embedding"], batch.index)
-        policy_v_h = v_h if self.embedding.policy_gradient else jax.lax.stop_gradient(v_h)
+        v_h = self.visible(state, self.conditioning.v_h(params["embedding"], batch.index))
         obs = self.normalize(batch.obs, state.obs_statistics)
-        mean, log_std = self._apply(params["network"], obs, policy_v_h, method="act")
-        value = self._apply(params["network"], obs, policy_v_h, method="value")
+        mean, log_std = self._apply(params["network"], obs, v_h, method="act")
+        value = self._apply(params["network"], obs, v_h, method="value")
         log_ratio = gaussian_log_prob(mean, log_std, batch.action) - batch.log_prob
         policy_loss = clipped_surrogate(log_ratio, batch.advantage, config.clip_eps)
         value_loss = clipped_value_loss(value, batch.value, batch.target, config.value_clip_eps)
         entropy = gaussian_entropy(log_std)
-        loss = policy_loss + config.value_cost * value_loss - config.entropy_cost * entropy
-        prediction_loss = jnp.zeros(())
-        if self._predicts:
-            prediction_loss = self._prediction_loss(params, batch, obs, v_h, state)
-            loss += self.embedding.prediction_cost * prediction_loss
         metrics = {
             "policy_loss": policy_loss,
             "value_loss": value_loss,
             "entropy": entropy,
             "approx_kl": jnp.mean(jnp.exp(log_ratio) - 1.0 - log_ratio),
             "clip_fraction": jnp.mean((jnp.abs(jnp.exp(log_ratio) - 1.0) > config.clip_eps).astype(jnp.float32)),
-            "prediction_loss": prediction_loss,
         }
-        return loss, metrics
-
-    def _prediction_loss(self, params: Params, batch: Batch, obs, v_h, state: PPOState) -> jax.Array:
-        """Mean absolute error of the predicted change of the observation, robust to the kicks of contacts."""
-        statistics = state.delta_statistics
-        change = running_statistics.normalize(batch.next_obs - batch.obs, statistics, max_abs_value=5.0)
-        predicted = self._apply(params["network"], obs, batch.executed_action, v_h, method="predict")
-        return jnp.mean(optax.huber_loss(predicted, change, delta=1.0))
+        return policy_loss + config.value_cost * value_loss - config.entropy_cost * entropy, metrics
 
 
 def label_params(params: Params) -> Any:

@@ -30,8 +30,7 @@ def collect(runs: pathlib.Path, results: pathlib.Path) -> list[str]:
     for folder in folders:
         by_name.setdefault(read_config(folder).name, []).append(folder)
         copy_files(folder, out / "runs" / folder.name, (CONFIG_FILE, ENVIRONMENT_FILE, METRICS_FILE, TIMING_FILE))
-    for group in by_name.values():
-        publish_policies(group, results / "policies")
+        publish_policy(folder, results / "policies" / folder.name)
     written = [f"{results}/policies: {', '.join(folder.name for folder in folders)}"]
     special = ("hopper_finetune", "hopper_embedding")
     main = {name: group for name, group in by_name.items() if name not in special}
@@ -52,13 +51,10 @@ def copy_files(source: pathlib.Path, target: pathlib.Path, names: Sequence[str])
         shutil.copy(source / name, target / name)
 
 
-def publish_policies(folders: Sequence[pathlib.Path], policies: pathlib.Path) -> None:
-    """Writes the newest policy of each of these runs, which differ in their seed alone, to a folder under `policies`."""
-    run = make_experiment(read_config(folders[0]))
-    for folder in folders:
-        target = policies / folder.name
-        copy_files(folder, target, (CONFIG_FILE, ENVIRONMENT_FILE))
-        write_policy(target, *load_state(folder, run))
+def publish_policy(folder: pathlib.Path, target: pathlib.Path) -> None:
+    """Writes the newest policy of a run, with its config and environment, to `target`."""
+    copy_files(folder, target, (CONFIG_FILE, ENVIRONMENT_FILE))
+    write_policy(target, load_state(folder, make_experiment(read_config(folder)))[1])
 
 
 def plot_groups(groups: Mapping[str, Sequence[pathlib.Path]], path: pathlib.Path, columns: Sequence[str]) -> None:

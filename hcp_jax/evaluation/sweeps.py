@@ -90,6 +90,6 @@ def play_trials(
         return run.ppo.mean_action(network, statistics, obs, v_h)
 
     params = (state.params["network"], state.obs_statistics)
-    episodes = Evaluator(run.make_env(pool), policy)(params, v_h, rows, key)
+    episodes = Evaluator(run.make_env(pool), policy)(params, run.ppo.visible(state, v_h), rows, key)
     parts = np.split(np.arange(len(rows)), trials)
     return [episodes.take(part) for part in parts]

@@ -113,6 +113,9 @@ class TrainingLoop:
             f"{run.config.resolved_num_envs} environments, physics {run.physics}, encoding {run.config.encoding}, "
             f"on {jax.devices()[0].device_kind}; compiling the training step"
         )
+        if self._iteration < run.ppo.identify_iterations:
+            steps = run.ppo.identify_iterations * self._batch_size
+            self._progress.say(f"identifying robots for {steps:,} steps; after that the policy starts afresh and sees v_h")
         while self._iteration < run.num_iterations:
             next_eval = min((self._iteration // self._eval_iterations + 1) * self._eval_iterations, run.num_iterations)
             count = min(self._chunk, next_eval - self._iteration)

@@ -11,20 +11,19 @@ from hcp_jax.training.checkpoint import CheckpointError, check_architecture, lea
 
 POLICY_FILE = "policy.msgpack"
 # What of PPOState a policy needs, and what fitting v_h of new robots to it needs.
-_FIELDS = ("params", "obs_statistics", "delta_statistics")
+_FIELDS = ("iteration", "params", "obs_statistics", "model_statistics")
 
 
-def write_policy(folder: pathlib.Path, iteration: int, state: PPOState) -> pathlib.Path:
-    """Writes `policy.msgpack`: networks, embedding and observation statistics, float32. Returns its path."""
-    fields = {name: getattr(state, name) for name in _FIELDS}
-    content = {"iteration": iteration} | jax.device_get(flax.serialization.to_state_dict(fields))
+def write_policy(folder: pathlib.Path, state: PPOState) -> pathlib.Path:
+    """Writes `policy.msgpack`: networks, embedding and statistics, float32. Returns its path."""
+    content = flax.serialization.to_state_dict({name: getattr(state, name) for name in _FIELDS})
     path = folder / POLICY_FILE
-    path.write_bytes(flax.serialization.msgpack_serialize(content))
+    path.write_bytes(flax.serialization.msgpack_serialize(jax.device_get(content)))
     return path
 
 
-def read_policy(folder: pathlib.Path, template: PPOState) -> tuple[int, PPOState]:
-    """Number of iterations and `template` with the policy put in.
+def read_policy(folder: pathlib.Path, template: PPOState) -> PPOState:
+    """`template` with the policy put in.
 
     Raises:
         CheckpointError: the file is damaged, or of another architecture than `template`.
@@ -33,10 +32,8 @@ def read_policy(folder: pathlib.Path, template: PPOState) -> tuple[int, PPOState
     try:
         content = flax.serialization.msgpack_restore(path.read_bytes())
         fields = {name: content[name] for name in _FIELDS}
-        iteration = int(content["iteration"])
     except (ValueError, KeyError, TypeError) as error:
         raise CheckpointError(f"{path}: damaged ({type(error).__name__})") from error
     shapes = {leaf_name(path): np.shape(leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(fields)}
     check_architecture(shapes, template, str(path))
-    restored = flax.serialization.from_state_dict({name: getattr(template, name) for name in _FIELDS}, fields)
-    return iteration, template.replace(**restored)
+    return template.replace(**flax.serialization.from_state_dict({name: getattr(template, name) for name in _FIELDS}, fields))

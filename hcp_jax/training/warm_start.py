@@ -21,7 +21,8 @@ def load_state(folder: pathlib.Path, run: Experiment, best: bool = False) -> tup
     checkpoint_folder = folder / run_folder.CHECKPOINT_FOLDER
     if not checkpoint_folder.is_dir():
         if (folder / POLICY_FILE).exists():
-            return read_policy(folder, run.init_state())
+            state = read_policy(folder, run.init_state())
+            return int(state.iteration), state
         raise CheckpointError(f"{folder}: holds no checkpoint")
     checkpoints = Checkpoints(checkpoint_folder, read_only=True)
     try:
@@ -38,8 +39,8 @@ def load_state(folder: pathlib.Path, run: Experiment, best: bool = False) -> tup
 def load_init(config: Config) -> Callable[[Experiment, PPOState], PPOState]:
     """Reads the run that `config.init` names; the result writes its hidden layers into a new run's state.
 
-    Hidden layers, observation statistics and the centre of the embedding carry over; output layers, the log standard
-    deviation and every robot's own v_h are new.
+    Hidden layers, observation statistics and the centre of the embedding carry over, and all of the forward model, which
+    gives v_h its meaning; output layers, the log standard deviation and every robot's own v_h are new.
 
     Raises:
         RunFolderError, CheckpointError: that run cannot be read, or its hidden layers do not fit `config`.
@@ -50,13 +51,15 @@ def load_init(config: Config) -> Callable[[Experiment, PPOState], PPOState]:
         old, new = _get(source_config, field), _get(config, field)
         if old != new:
             raise CheckpointError(f"init={config.init}: another architecture: its {field} is {old!r}, the config's {new!r}")
+    if bool(source_config.embedding.identify_steps) != bool(config.embedding.identify_steps):
+        raise CheckpointError(f"init={config.init}: its v_h was learned in another way (embedding.identify_steps)")
     source = load_state(folder, make_experiment(source_config))[1]
 
     def init(run: Experiment, state: PPOState) -> PPOState:
         network = copy_tree(state.params["network"])
         for part, layers in network["params"].items():
             for layer in layers if isinstance(layers, dict) else ():
-                if layer.startswith("hidden") and part in source.params["network"]["params"]:
+                if layer.startswith("hidden") or part == "forward_model":
                     layers[layer] = copy_tree(source.params["network"]["params"][part][layer])
         embedding = state.params["embedding"]
         if embedding is not None:
@@ -64,7 +67,7 @@ def load_init(config: Config) -> Callable[[Experiment, PPOState], PPOState]:
         return state.replace(
             params={"network": network, "embedding": embedding},
             obs_statistics=copy_tree(source.obs_statistics),
-            delta_statistics=copy_tree(source.delta_statistics),
+            model_statistics=copy_tree(source.model_statistics),
         )
 
     return init

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from hcp_jax.algorithms.identification import standardize_embedding
 from hcp_jax.algorithms.ppo import PPO, clipped_surrogate, clipped_value_loss, label_params
 from hcp_jax.config import EmbeddingConfig, PPOConfig
 from hcp_jax.policies.conditioning import Embedding
@@ -29,6 +30,7 @@ CONFIG = PPOConfig(
     hidden_sizes=(16, 16),
 )
 EMBEDDING = EmbeddingConfig(size=2, initial_scale=0.05, learning_rate=1e-2)
+IDENTIFIED = dataclasses.replace(EMBEDDING, identify_steps=3 * NUM_ENVS * CONFIG.unroll_length)
 
 
 class NoHardware:
@@ -113,18 +115,58 @@ def test_a_frozen_network_still_learns_the_embedding_of_new_robots():
     assert mean_action(learner, fitted, 0, robot=1) > 0.5
 
 
-@pytest.mark.parametrize("source", ["policy", "prediction"])
-def test_the_embedding_learns_from_the_losses_it_is_asked_to(source):
-    embedding = dataclasses.replace(EMBEDDING, prediction_cost=1.0, policy_gradient=False)
-    if source == "policy":
-        embedding = EMBEDDING
-    env = ProbeEnv(1, opposite_actions)
-    ppo = PPO(env, Embedding(2, 2, 0.05), CONFIG, embedding, NUM_ENVS, 5)
+def learn_embedding(embedding: EmbeddingConfig, iterations: int):
+    """Params and state after `iterations`, and the params before."""
+    ppo = PPO(ProbeEnv(1, opposite_actions), Embedding(2, 2, 0.05), CONFIG, embedding, NUM_ENVS, 10)
     before = ppo.init(jax.random.key(0))
-    table = np.asarray(before.params["embedding"])
-    after = ppo.train(before, 5)
-    assert np.abs(np.asarray(after.params["embedding"]) - table).max() > 1e-3
-    assert (float(after.sums["prediction_loss"]) > 0) is (source == "prediction")
+    start = jax.tree.map(np.asarray, before.params)
+    return start, ppo.train(before, iterations)
+
+
+def test_the_plain_embedding_learns_with_the_policy():
+    start, state = learn_embedding(EMBEDDING, 3)
+    assert np.abs(np.asarray(state.params["embedding"]) - start["embedding"]).max() > 1e-3
+    assert float(state.sums["prediction_loss"]) == 0
+
+
+def test_the_policy_is_blind_to_v_h_while_robots_are_identified():
+    start, state = learn_embedding(IDENTIFIED, 2)
+    kernels = [params["network"]["params"]["policy"]["hidden_0"]["kernel"] for params in (start, state.params)]
+    np.testing.assert_array_equal(kernels[0][-2:], kernels[1][-2:])
+    assert np.abs(np.asarray(kernels[1] - kernels[0])).max() > 1e-3
+    assert np.abs(np.asarray(state.params["embedding"]) - start["embedding"]).max() > 1e-3
+    assert float(state.sums["prediction_loss"]) > 0
+
+
+def test_after_identification_the_embedding_is_standardised_and_stands_still_while_the_policy_uses_it():
+    identified, later = learn_embedding(IDENTIFIED, 3)[1], learn_embedding(IDENTIFIED, 5)[1]
+    embedding = np.asarray(identified.params["embedding"])
+    np.testing.assert_allclose(embedding.mean(axis=0), 0, atol=1e-5)
+    np.testing.assert_allclose(embedding.std(axis=0), 1, rtol=1e-4)
+    np.testing.assert_array_equal(embedding, later.params["embedding"])
+    old, new = identified.params["network"]["params"], later.params["network"]["params"]
+    jax.tree.map(np.testing.assert_array_equal, old["forward_model"], new["forward_model"])
+    assert np.abs(np.asarray(new["policy"]["hidden_0"]["kernel"] - old["policy"]["hidden_0"]["kernel"])[-2:]).max() > 1e-3
+
+
+def test_the_policy_starts_afresh_once_the_robots_are_identified():
+    """Its output is what initialisation gives: nearly nothing, and the log std of the start."""
+    network = learn_embedding(IDENTIFIED, 3)[1].params["network"]["params"]
+    assert np.abs(np.asarray(network["policy"]["output"]["kernel"])).max() < 0.02
+    assert float(network["log_std"][0]) == CONFIG.initial_log_std
+
+
+def test_standardising_the_embedding_leaves_the_predictions_as_they_were(key):
+    ppo = PPO(ProbeEnv(1, opposite_actions), Embedding(5, 2, 0.3), CONFIG, IDENTIFIED, NUM_ENVS, 10)
+    params = ppo.init_params(key)
+    standardised = standardize_embedding(params)
+    obs, action = jax.random.normal(key, (5, 2)), jax.random.normal(key, (5, 1))
+
+    def predict(params):
+        return ppo.network.apply(params["network"], obs, action, params["embedding"], method="predict")
+
+    np.testing.assert_allclose(predict(standardised), predict(params), atol=1e-5)
+    assert np.abs(np.asarray(standardised["embedding"] - params["embedding"])).max() > 0.1
 
 
 def test_the_same_seed_gives_the_same_parameters_and_another_seed_others():
@@ -166,20 +208,8 @@ def test_a_clipped_value_is_charged_the_larger_error():
     np.testing.assert_allclose(clipped_value_loss(value, old, target, 0.0), 0.0, atol=1e-7)
 
 
-def test_a_settled_embedding_stands_still_while_an_unsettled_one_moves():
-    def displacement(settle_steps: int) -> float:
-        embedding = dataclasses.replace(EMBEDDING, prediction_cost=1.0, settle_steps=settle_steps)
-        ppo = PPO(ProbeEnv(1, opposite_actions), Embedding(2, 2, 0.05), CONFIG, embedding, NUM_ENVS, 100)
-        state = ppo.init(jax.random.key(0))
-        table = np.asarray(state.params["embedding"])
-        return float(np.abs(np.asarray(ppo.train(state, 5).params["embedding"]) - table).max())
-
-    assert displacement(settle_steps=1) < 0.1 * displacement(settle_steps=0)
-
-
 def test_every_parameter_has_one_optimiser():
-    embedding = dataclasses.replace(EMBEDDING, prediction_cost=1.0)
-    ppo = PPO(ProbeEnv(1, opposite_actions), Embedding(2, 2, 0.05), CONFIG, embedding, NUM_ENVS, 1)
+    ppo = PPO(ProbeEnv(1, opposite_actions), Embedding(2, 2, 0.05), CONFIG, IDENTIFIED, NUM_ENVS, 4)
     labels = label_params(ppo.init_params(jax.random.key(0)))
     parts = labels["network"]["params"]
     assert labels["embedding"] == "embedding"
