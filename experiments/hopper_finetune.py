@@ -1,7 +1,10 @@
 """Transfer to 100 new hoppers (paper, figure 4b): hidden layers from an HCP-I run, new embeddings. Preset: fast.
 
-Set `--config.init=runs/hopper_hcpi` to another run folder, or `--config.init=` for the same from scratch.
+Set `--config.init=runs/hopper_hcpi` to another run folder. `--config.init= --config.embedding.identify_steps=1_280_000` trains
+the same from scratch: without a forward model to start from, identification takes longer.
 """
+
+import dataclasses
 
 from hcp_jax import presets
 from hcp_jax.config import Config, PoolConfig
@@ -16,5 +19,5 @@ def get_config() -> Config:
         num_envs=1000,
         init="runs/hopper_hcpi",
         pool=PoolConfig(num_robots=100, split="new"),
-        embedding=presets.IDENTIFIED_EMBEDDING,
+        embedding=dataclasses.replace(presets.IDENTIFIED_EMBEDDING, identify_steps=320_000, fit_steps=0),
     )
