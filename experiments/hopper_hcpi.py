@@ -1,4 +1,4 @@
-"""HCP-I on 1000 hoppers: v_h is learned (paper, section 3.2), here by predicting the robot's motion. Preset: fast."""
+"""HCP-I on 1000 hoppers: v_h is learned (paper, section 3.2), here first of all, by predicting the motion. Preset: fast."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from hcp_jax.algorithms.ppo import PPO, Params, PPOState
+from hcp_jax.algorithms.ppo import PPO, Params, PPOState, get_actor, put_actor
 from hcp_jax.config import Config, PoolConfig
 from hcp_jax.envs.base import PoolEnv
 from hcp_jax.envs.episodes import Episodes, Evaluator
@@ -125,8 +125,8 @@ def evaluate_run(run: Experiment, state: PPOState, heldout: jax.Array | None = N
 class EmbeddingFitter:
     """Learns v_h of a pool's robots from their experience, with the networks frozen (paper, section 5.2, made honest).
 
-    It does what gave the training robots theirs, starting from their mean: v_h is identified while the policy acts on the
-    mean, or learns from policy and value loss.
+    It does what gave the training robots theirs, starting from their mean: v_h is identified under the actor that those were
+    identified under, or it learns from policy and value loss.
     """
 
     def __init__(self, run: Experiment, pool: RobotPool, steps_per_robot: int):
@@ -137,14 +137,16 @@ class EmbeddingFitter:
         """
         config = run.config
         env_steps = steps_per_robot * pool.num_robots
+        self._identify_iterations = run.ppo.identify_iterations
         self._num_robots = pool.num_robots
         self._num_iterations = max(1, round(env_steps / config.batch_size))
         self._key = jax.random.fold_in(jax.random.key(config.seed), _FIT)
+        self._identified: jax.Array | None = None
         self._ppo = PPO(
             run.make_env(pool),
             Embedding(pool.num_robots, config.embedding.size, config.embedding.initial_scale),
             config.ppo,
-            dataclasses.replace(config.embedding, identify_steps=env_steps if run.ppo.identify_iterations else 0),
+            dataclasses.replace(config.embedding, identify_steps=env_steps if self._identify_iterations else 0),
             config.resolved_num_envs,
             self._num_iterations,
             train_network=False,
@@ -153,13 +155,23 @@ class EmbeddingFitter:
 
     def __call__(self, state: PPOState) -> jax.Array:
         """v_h of the new robots under the networks of `state`, which is left as it is: [num_robots, K]."""
+        if self._identified is not None:
+            return self._identified
+        is_identified = 0 < self._identify_iterations <= int(state.iteration)
+        actor = get_actor(state.params, state.obs_statistics)
+        if is_identified and state.reserve is not None:
+            actor = state.reserve
         mean = jnp.tile(state.params["embedding"].mean(axis=0), (self._num_robots, 1))
+        params = {"network": put_actor(actor, state.params["network"]), "embedding": mean}
         fit_state = self._ppo.init(self._key).replace(
-            params={"network": copy_tree(state.params["network"]), "embedding": mean},
-            obs_statistics=copy_tree(state.obs_statistics),
+            params=copy_tree(params),
+            obs_statistics=copy_tree(actor.obs_statistics),
             model_statistics=copy_tree(state.model_statistics),
         )
-        return self._ppo.train(fit_state, self._num_iterations).params["embedding"]
+        v_h = self._ppo.train(fit_state, self._num_iterations).params["embedding"]
+        if is_identified:  # what it depends on stands still from here on
+            self._identified = v_h
+        return v_h
 
 
 def copy_tree(tree):

@@ -8,8 +8,8 @@ train(state, n):                         one jitted call, buffers donated
                                          networks and embedding have their own step sizes
 
 With `embedding.identify_steps` the first iterations also identify the robots: policy and value function see zeros for v_h,
-while embedding and forward model reduce the error of predicting the next observation. Then both start afresh and see v_h,
-which stands still from there on.
+while embedding and forward model reduce the error of predicting the next observation. Then a fresh policy and value function
+take over and see v_h, which stands still from there on.
 """
 
 import functools
@@ -68,14 +68,16 @@ class Batch:
 class PPOState:
     """Everything that training carries from one iteration to the next.
 
-    iteration: [] int32 iterations done; model_statistics: of [obs, change of obs], the forward model's units, which stand
-    still after the identification; diverged: [N] int32 episodes that each robot lost to non-finite physics; overflow: []
-    int32 worlds that ever overflowed; sums: running sums of metrics since they were last read.
+    iteration: [] int32 iterations done; reserve: before the identification's end the actor to go on with, after it the one
+    that robots were identified under, None without identification; model_statistics: of [obs, change of obs], the forward
+    model's units, which stand still after the identification; diverged: [N] int32 episodes that each robot lost to non-finite
+    physics; overflow: [] int32 worlds that ever overflowed; sums: running sums of metrics since they were last read.
     """
 
     iteration: jax.Array
     params: Any
-    opt_state: optax.OptState
+    reserve: "Actor | None"
+    opt_state: Any
     obs_statistics: running_statistics.RunningStatisticsState
     model_statistics: running_statistics.RunningStatisticsState
     env_state: EnvState
@@ -85,6 +87,15 @@ class PPOState:
     sums: dict[str, jax.Array]
 
 
+@struct.dataclass
+class Actor:
+    """A policy with its value function, and the observations that it was trained on. network: those parts of the params."""
+
+    network: Any
+    obs_statistics: running_statistics.RunningStatisticsState
+
+
+ACTOR_PARTS = ("policy", "value_function", "log_std")
 LOSS_METRICS = ("policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "prediction_loss")
 SUMS = (*LOSS_METRICS, "iterations", "episodes", "episode_return", "episode_length", "value_error", "target_variance")
 
@@ -165,12 +176,16 @@ class PPO:
 
     def init(self, key: jax.Array) -> PPOState:
         """The state before the first iteration."""
-        key, key_params, key_index, key_env = jax.random.split(key, 4)
+        key, key_params, key_index, key_env, key_reserve = jax.random.split(key, 5)
         params = self.init_params(key_params)
         spec = specs.Array((self.env.observation_size,), jnp.float32)
+        reserve = None
+        if self.identify_iterations:
+            reserve = get_actor(self.init_params(key_reserve), running_statistics.init_state(spec))
         return PPOState(
             iteration=jnp.int32(0),
             params=params,
+            reserve=reserve,
             opt_state=self._optimizer.init(params),
             obs_statistics=running_statistics.init_state(spec),
             model_statistics=running_statistics.init_state(specs.Array((2 * self.env.observation_size,), jnp.float32)),
@@ -203,21 +218,17 @@ class PPO:
         batch, episode_sums = self._make_batch(state, transitions, log_prob, action)
         if self.identify_iterations:
             identifies = state.iteration < self.identify_iterations
-            params, opt_state, model_statistics, losses = jax.lax.cond(
-                identifies, self._learn_and_identify, self._learn, state, batch, key_update
-            )
+            state, losses = jax.lax.cond(identifies, self._learn_and_identify, self._learn, state, batch, key_update)
         else:
-            params, opt_state, model_statistics, losses = self._learn(state, batch, key_update)
-        obs_statistics = state.obs_statistics
+            state, losses = self._learn(state, batch, key_update)
         if self._train_network:
-            obs_statistics = running_statistics.update(obs_statistics, batch.obs)
+            state = state.replace(obs_statistics=running_statistics.update(state.obs_statistics, batch.obs))
+        if self.identify_iterations:
+            is_last = state.iteration + 1 == self.identify_iterations
+            state = jax.lax.cond(is_last, self._change_actors, lambda state: state, state)
         sums = {"iterations": jnp.ones(()), **episode_sums, **losses}
-        return PPOState(
+        return state.replace(
             iteration=state.iteration + 1,
-            params=params,
-            opt_state=opt_state,
-            obs_statistics=obs_statistics,
-            model_statistics=model_statistics,
             env_state=env_state,
             key=key,
             diverged=state.diverged.at[transitions.index].add(transitions.diverged.astype(jnp.int32)),
@@ -225,13 +236,13 @@ class PPO:
             sums={name: state.sums[name] + sums[name] for name in SUMS},
         )
 
-    def _learn(self, state: PPOState, batch: Batch, key: jax.Array):
+    def _learn(self, state: PPOState, batch: Batch, key: jax.Array) -> tuple[PPOState, dict]:
         """One iteration's updates of policy and value function, and of the embedding unless it was identified."""
-        params, opt_state, losses = self._update(state, batch, key, self._ppo_loss)
-        return params, opt_state, state.model_statistics, losses | {"prediction_loss": jnp.zeros(())}
+        state, losses = self._update(state, batch, key, self._ppo_loss)
+        return state, losses | {"prediction_loss": jnp.zeros(())}
 
-    def _learn_and_identify(self, state: PPOState, batch: Batch, key: jax.Array):
-        """The same with embedding and forward model; after the last such iteration the policy starts afresh."""
+    def _learn_and_identify(self, state: PPOState, batch: Batch, key: jax.Array) -> tuple[PPOState, dict]:
+        """The same with embedding and forward model."""
         if self._train_forward_model:
             variables = forward_model_variables(batch.obs, batch.next_obs)
             state = state.replace(model_statistics=running_statistics.update(state.model_statistics, variables))
@@ -247,21 +258,22 @@ class PPO:
             )
             return ppo_loss + error, metrics | {"prediction_loss": error}
 
-        params, opt_state, losses = self._update(state, batch, key, loss)
-        if self._train_forward_model:
-            is_last = state.iteration + 1 == self.identify_iterations
-            params, opt_state = jax.lax.cond(is_last, self._restart, lambda *learned: learned[:2], params, opt_state, key)
-        return params, opt_state, state.model_statistics, losses
+        return self._update(state, batch, key, loss)
 
-    def _restart(self, params: Params, opt_state: optax.OptState, key: jax.Array):
-        """A standardised embedding, and policy and value function as they were before they learned."""
-        params = standardize_embedding(params)
-        fresh = self.init_params(key)
-        forward_model = params["network"]["params"]["forward_model"]
-        network = {"params": fresh["network"]["params"] | {"forward_model": forward_model}}
-        inner_states = self._optimizer.init(fresh).inner_states
-        inner_states = opt_state.inner_states | {"network": inner_states["network"]}
-        return {"network": network, "embedding": params["embedding"]}, opt_state._replace(inner_states=inner_states)
+    def _change_actors(self, state: PPOState) -> PPOState:
+        """Ends the identification: standardises the embedding and puts the actor in reserve to work."""
+        assert state.reserve is not None
+        params, obs_statistics = standardize_embedding(state.params), state.obs_statistics
+        if not self._train_forward_model:  # v_h keeps its meaning, and the actor in reserve has acted before
+            params, obs_statistics = state.params, state.reserve.obs_statistics
+        params = params | {"network": put_actor(state.reserve, params["network"])}
+        inner_states = state.opt_state.inner_states | {"network": self._optimizer.init(params).inner_states["network"]}
+        return state.replace(
+            params=params,
+            reserve=get_actor(state.params, state.obs_statistics),
+            opt_state=state.opt_state._replace(inner_states=inner_states),
+            obs_statistics=obs_statistics,
+        )
 
     def visible(self, state: PPOState, v_h: jax.Array) -> jax.Array:
         """v_h [..., K] as policy and value function see it: zeros as long as the robots are being identified."""
@@ -321,7 +333,7 @@ class PPO:
         num_samples = self.num_envs * config.unroll_length
         return jax.tree.map(lambda x: x.reshape(num_samples, *x.shape[2:]), batch), sums
 
-    def _update(self, state: PPOState, batch: Batch, key: jax.Array, loss: Callable):
+    def _update(self, state: PPOState, batch: Batch, key: jax.Array, loss: Callable) -> tuple[PPOState, dict]:
         """Epochs of minibatches. `loss(params, minibatch, state)` gives a loss and its metrics."""
         num_samples = batch.obs.shape[0]
 
@@ -338,7 +350,7 @@ class PPO:
 
         keys = jax.random.split(key, self.config.num_epochs)
         (params, opt_state), metrics = jax.lax.scan(epoch, (state.params, state.opt_state), keys)
-        return params, opt_state, jax.tree.map(jnp.mean, metrics)
+        return state.replace(params=params, opt_state=opt_state), jax.tree.map(jnp.mean, metrics)
 
     def _ppo_loss(self, params: Params, batch: Batch, state: PPOState) -> tuple[jax.Array, dict]:
         config = self.config
@@ -358,6 +370,16 @@ class PPO:
             "clip_fraction": jnp.mean((jnp.abs(jnp.exp(log_ratio) - 1.0) > config.clip_eps).astype(jnp.float32)),
         }
         return policy_loss + config.value_cost * value_loss - config.entropy_cost * entropy, metrics
+
+
+def get_actor(params: Params, obs_statistics: running_statistics.RunningStatisticsState) -> Actor:
+    """The actor in `params`."""
+    return Actor({name: params["network"]["params"][name] for name in ACTOR_PARTS}, obs_statistics)
+
+
+def put_actor(actor: Actor, network: dict) -> dict:
+    """`network` with that actor's policy and value function."""
+    return {"params": network["params"] | actor.network}
 
 
 def label_params(params: Params) -> Any:

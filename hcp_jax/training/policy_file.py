@@ -11,7 +11,7 @@ from hcp_jax.training.checkpoint import CheckpointError, check_architecture, lea
 
 POLICY_FILE = "policy.msgpack"
 # What of PPOState a policy needs, and what fitting v_h of new robots to it needs.
-_FIELDS = ("iteration", "params", "obs_statistics", "model_statistics")
+_FIELDS = ("iteration", "params", "reserve", "obs_statistics", "model_statistics")
 
 
 def write_policy(folder: pathlib.Path, state: PPOState) -> pathlib.Path:

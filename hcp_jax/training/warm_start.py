@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import jax.numpy as jnp
 
-from hcp_jax.algorithms.ppo import PPOState
+from hcp_jax.algorithms.ppo import PPOState, get_actor, put_actor
 from hcp_jax.config import Config
 from hcp_jax.experiment import Experiment, copy_tree, make_experiment
 from hcp_jax.training import run_folder
@@ -39,8 +39,9 @@ def load_state(folder: pathlib.Path, run: Experiment, best: bool = False) -> tup
 def load_init(config: Config) -> Callable[[Experiment, PPOState], PPOState]:
     """Reads the run that `config.init` names; the result writes its hidden layers into a new run's state.
 
-    Hidden layers, observation statistics and the centre of the embedding carry over, and all of the forward model, which
-    gives v_h its meaning; output layers, the log standard deviation and every robot's own v_h are new.
+    Hidden layers, observation statistics and the centre of the embedding carry over; output layers, the log standard
+    deviation and every robot's own v_h are new. Where robots are identified, the new ones are so first, with the old run's
+    forward model and the actor that it identified its robots under.
 
     Raises:
         RunFolderError, CheckpointError: that run cannot be read, or its hidden layers do not fit `config`.
@@ -61,12 +62,18 @@ def load_init(config: Config) -> Callable[[Experiment, PPOState], PPOState]:
             for layer in layers if isinstance(layers, dict) else ():
                 if layer.startswith("hidden") or part == "forward_model":
                     layers[layer] = copy_tree(source.params["network"]["params"][part][layer])
+        obs_statistics, reserve = copy_tree(source.obs_statistics), None
+        if source.reserve is not None:
+            reserve = get_actor({"network": network}, obs_statistics)
+            network = put_actor(copy_tree(source.reserve), network)
+            obs_statistics = copy_tree(source.reserve.obs_statistics)
         embedding = state.params["embedding"]
         if embedding is not None:
             embedding = embedding + jnp.mean(source.params["embedding"], axis=0)
         return state.replace(
             params={"network": network, "embedding": embedding},
-            obs_statistics=copy_tree(source.obs_statistics),
+            reserve=reserve,
+            obs_statistics=obs_statistics,
             model_statistics=copy_tree(source.model_statistics),
         )
 

@@ -156,6 +156,15 @@ def test_the_policy_starts_afresh_once_the_robots_are_identified():
     assert float(network["log_std"][0]) == CONFIG.initial_log_std
 
 
+def test_the_actor_that_robots_were_identified_under_is_kept():
+    before, at_the_end, later = (learn_embedding(IDENTIFIED, iterations)[1] for iterations in (2, 3, 5))
+    jax.tree.map(np.testing.assert_array_equal, at_the_end.reserve, later.reserve)
+    fresh, acting, kept = before.reserve.network, at_the_end.params["network"]["params"], at_the_end.reserve.network
+    np.testing.assert_array_equal(acting["policy"]["output"]["kernel"], fresh["policy"]["output"]["kernel"])
+    blind = before.params["network"]["params"]["policy"]["output"]["kernel"]
+    assert 0 < np.abs(np.asarray(kept["policy"]["output"]["kernel"] - blind)).max() < 0.5
+
+
 def test_standardising_the_embedding_leaves_the_predictions_as_they_were(key):
     ppo = PPO(ProbeEnv(1, opposite_actions), Embedding(5, 2, 0.3), CONFIG, IDENTIFIED, NUM_ENVS, 10)
     params = ppo.init_params(key)

@@ -5,9 +5,11 @@ import pathlib
 import shutil
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from hcp_jax.algorithms.ppo import get_actor
 from hcp_jax.experiment import make_experiment
 from hcp_jax.training import loop
 from hcp_jax.training.checkpoint import Checkpoints
@@ -103,19 +105,33 @@ def test_heldout_robots_do_not_depend_on_the_training_seed(tiny_config):
     jax.tree.map(np.testing.assert_array_equal, one.train_pool, other.train_pool)
 
 
-def test_a_warm_start_takes_hidden_layers_and_leaves_output_layers_and_embeddings_new(finished, tiny_config):
+@pytest.fixture(scope="module")
+def warm(finished, tiny_config):
+    """A warm-started experiment on new robots, its state at the start, and the state that it starts from."""
     config = dataclasses.replace(tiny_config, init=str(finished), pool=dataclasses.replace(tiny_config.pool, split="new"))
     run = make_experiment(config)
-    fresh = run.init_state()
-    state = load_init(config)(run, run.init_state())
-    source = load_state(finished, make_experiment(tiny_config))[1]
-    policy, source_policy = (s.params["network"]["params"]["policy"] for s in (state, source))
-    fresh_policy = fresh.params["network"]["params"]["policy"]
+    return run, load_init(config)(run, run.init_state()), load_state(finished, make_experiment(tiny_config))[1]
+
+
+def test_a_warm_start_takes_hidden_layers_and_leaves_output_layers_and_embeddings_new(warm):
+    run, state, source = warm
+    fresh = run.init_state().params
+    policy, source_policy = state.reserve.network["policy"], source.params["network"]["params"]["policy"]
     np.testing.assert_array_equal(policy["hidden_1"]["kernel"], source_policy["hidden_1"]["kernel"])
-    np.testing.assert_array_equal(policy["output"]["kernel"], fresh_policy["output"]["kernel"])
+    np.testing.assert_array_equal(policy["output"]["kernel"], fresh["network"]["params"]["policy"]["output"]["kernel"])
     assert not np.array_equal(state.params["embedding"], source.params["embedding"])
     np.testing.assert_allclose(
-        state.params["embedding"] - fresh.params["embedding"],
-        np.tile(source.params["embedding"].mean(axis=0), (8, 1)),
-        atol=1e-6,
+        state.params["embedding"] - fresh["embedding"], np.tile(source.params["embedding"].mean(axis=0), (8, 1)), atol=1e-6
     )
+
+
+def test_a_warm_start_identifies_its_robots_under_the_old_actor_with_the_old_forward_model(warm):
+    run, state, source = warm
+    jax.tree.map(np.testing.assert_array_equal, get_actor(state.params, state.obs_statistics), source.reserve)
+    hidden = np.asarray(state.reserve.network["policy"]["hidden_1"]["kernel"])
+    start = np.asarray(state.params["embedding"])
+    state = run.ppo.train(jax.tree.map(jnp.copy, state), run.ppo.identify_iterations)
+    models = [params["network"]["params"]["forward_model"] for params in (state.params, source.params)]
+    jax.tree.map(np.testing.assert_array_equal, *models)
+    np.testing.assert_array_equal(state.params["network"]["params"]["policy"]["hidden_1"]["kernel"], hidden)
+    assert np.abs(np.asarray(state.params["embedding"]) - start).max() > 1e-3
