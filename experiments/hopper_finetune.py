@@ -14,10 +14,11 @@ def get_config() -> Config:
     return presets.hopper(
         "hopper_finetune",
         encoding="embedding",
-        total_env_steps=6_400_000,
+        total_env_steps=12_800_000,
         eval_every=320_000,
         num_envs=1000,
+        ppo=dataclasses.replace(presets.FAST_PPO, learning_rate=6e-4),
         init="runs/hopper_hcpi",
         pool=PoolConfig(num_robots=100, split="new"),
-        embedding=dataclasses.replace(presets.IDENTIFIED_EMBEDDING, identify_steps=320_000, fit_steps=0),
+        embedding=dataclasses.replace(presets.IDENTIFIED_EMBEDDING, identify_steps=160_000, fit_steps=0),
     )
