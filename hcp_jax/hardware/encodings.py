@@ -44,15 +44,22 @@ def _kinematics(pool: RobotPool, reference: RobotPool) -> np.ndarray:
 
 
 def _dynamics(pool: RobotPool, reference: RobotPool) -> np.ndarray:
-    values = np.concatenate([pool.hardware[name] for name in _DYNAMICS], axis=1)
-    reference_values = np.concatenate([reference.hardware[name] for name in _DYNAMICS], axis=1)
-    low, high = reference_values.min(axis=0), reference_values.max(axis=0)
-    return ((values - low) / np.where(high - low > 1e-9, high - low, 1.0)).astype(np.float32)
+    values = [np.concatenate([robots.hardware[name] for name in _DYNAMICS], axis=1) for robots in (pool, reference)]
+    return scale_to_unit(*values).astype(np.float32)
 
 
 def _random(pool: RobotPool) -> np.ndarray:
-    """Noise keyed by the robot's own hardware, so a robot keeps its vector whatever pool it stands in."""
-    width = sum(pool.hardware[name].shape[1] for name in ("link_length", *_DYNAMICS))
+    return random_encoding(pool, sum(pool.hardware[name].shape[1] for name in ("link_length", *_DYNAMICS)))
+
+
+def scale_to_unit(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Columns of `values` [N, K] scaled so that those of `reference` [M, K] span [0, 1]; constant ones are only shifted."""
+    low, high = reference.min(axis=0), reference.max(axis=0)
+    return (values - low) / np.where(high - low > 1e-9, high - low, 1.0)
+
+
+def random_encoding(pool: RobotPool, width: int) -> np.ndarray:
+    """Noise [N, width] keyed by the robot's own hardware, so a robot keeps its vector whatever pool it stands in."""
     rows = []
     for row in range(pool.num_robots):
         parts = [np.ascontiguousarray(pool.hardware[name][row]).tobytes() for name in sorted(pool.hardware)]

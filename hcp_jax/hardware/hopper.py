@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from hcp_jax.hardware.pool import RobotPool, robots_path, stack_models
-from hcp_jax.hardware.ranges import HopperRanges, sample_half_below_one, sample_uniform
+from hcp_jax.hardware.ranges import SPLIT_STRIDE, SPLITS, HopperRanges, sample_half_below_one, sample_uniform
 
 TEMPLATE = "hopper.xml"
 LINKS = ("torso", "thigh", "leg", "foot")
@@ -14,11 +14,6 @@ JOINTS = ("thigh_joint", "leg_joint", "foot_joint")
 DENSITY = 1000.0  # [kg/m^3], at mass ratio 1
 ANKLE_HEIGHT = 0.1  # [m] of the foot's axis above the floor in the initial stand
 HEEL_SHARE = 1.0 / 3.0  # the foot reaches a third of its length behind the ankle
-
-# Purposes of random draws, and the distance between their robot ids: held-out robots never depend on how many training
-# robots there are, and robot 1_000_003 is held-out robot 3 of its seed.
-SPLITS = {"train": 0, "heldout": 1, "new": 2}
-SPLIT_STRIDE = 1_000_000
 
 Hardware = dict[str, np.ndarray]
 

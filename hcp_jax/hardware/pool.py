@@ -17,6 +17,7 @@ from flax import struct
 # any other field, so that a field can be forgotten neither here nor by a backend.
 VARIANT_FIELDS = (
     "actuator_acc0",
+    "actuator_gear",
     "body_inertia",
     "body_invweight0",
     "body_ipos",
@@ -37,6 +38,7 @@ VARIANT_FIELDS = (
     "geom_quat",
     "geom_rbound",
     "geom_size",
+    "jnt_range",
     "light_poscom0",
 )
 # Scales the solver's tolerance; MJX cannot batch it, native physics does.

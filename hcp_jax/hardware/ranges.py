@@ -6,6 +6,15 @@ import numpy as np
 
 Range = tuple[float, float]
 
+# Purposes of random draws, and the distance between their robot ids: held-out robots never depend on how many training
+# robots there are, and robot 1_000_003 is held-out robot 3 of its seed.
+SPLITS = {"train": 0, "heldout": 1, "new": 2}
+SPLIT_STRIDE = 1_000_000
+
+
+# [m] Every link of the nominal arm is longer than this: a link may shrink but not turn round.
+SHORTEST_LINK_CHANGE = -0.25
+
 
 class RangeError(ValueError):
     """A range is empty, reversed or outside what physics allows."""
@@ -63,6 +72,41 @@ class HopperRanges:
         for field in dataclasses.fields(self):
             positive = field.name.endswith(("_length", "_mass_ratio"))
             check_range(f"ranges.{field.name}", getattr(self, field.name), minimum=1e-3 if positive else 0.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class ArmRanges:
+    """Ranges of the arm pool (paper, appendix, table "Manipulator Parameters").
+
+    Links `l0` to `l6` are changes of length [m] from the nominal arm. Friction loss [N m] is uniform; damping [N m s/rad],
+    armature [kg m^2] and mass ratios (of the nominal arm's bodies) are below 1 for half of the draws and above for half.
+    """
+
+    l0: Range = (-0.10, 0.10)
+    l1_1: Range = (-0.05, 0.05)
+    l1_2: Range = (-0.07, 0.07)
+    l2: Range = (-0.12, 0.12)
+    l3_1: Range = (-0.06, 0.06)
+    l3_2: Range = (-0.06, 0.06)
+    l4: Range = (-0.12, 0.12)
+    l5_1: Range = (-0.04, 0.04)
+    l5_2: Range = (-0.03, 0.03)
+    l6: Range = (-0.02, 0.02)
+    mass_ratio: Range = (0.25, 4.0)
+    damping: Range = (0.01, 30.0)
+    frictionloss: Range = (0.0, 10.0)
+    armature: Range = (0.01, 4.0)
+
+    def __post_init__(self):
+        for field in dataclasses.fields(self):
+            minimum = SHORTEST_LINK_CHANGE if field.name.startswith("l") else 1e-3 if field.name == "mass_ratio" else 0.0
+            check_range(f"ranges.{field.name}", getattr(self, field.name), minimum)
+
+
+def nominal_lengths(ranges: ArmRanges) -> ArmRanges:
+    """`ranges` for arms that differ in dynamics alone (paper, appendix, "Effect of Dynamics")."""
+    links = [field.name for field in dataclasses.fields(ranges) if field.name.startswith("l")]
+    return dataclasses.replace(ranges, **dict.fromkeys(links, (0.0, 0.0)))
 
 
 def torso_mass_only() -> HopperRanges:

@@ -1,0 +1,68 @@
+"""Pools of arms: every variant as a padded chain, stacked.
+
+An arm is edited and compiled as MuJoCo sees it (`arm_reacher.xml`, `arm_peg.xml`), read as a chain, and compiled again in the
+template that all arms share. So composite inertias are MuJoCo's own, and every type stands in the same pool.
+"""
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from hcp_jax.hardware.arm import TYPES, arm_spec, sample_hardware
+from hcp_jax.hardware.chain import MAX_JOINTS, Chain, edit_spec, read_chain
+from hcp_jax.hardware.pool import RobotPool, robots_path, stack_models
+from hcp_jax.hardware.ranges import SPLIT_STRIDE, SPLITS, ArmRanges
+from hcp_jax.hardware.start_poses import start_angles
+
+CHAIN_TEMPLATES = {"reacher": "chain_reacher.xml", "peg_insertion": "chain_peg.xml"}
+TYPE_STRIDE = 10_000  # between robot ids of two types
+
+
+def make_arm_pool(
+    task: str, ranges: ArmRanges, types: Sequence[str], num_per_type: int, seed: int, split: str = "train"
+) -> RobotPool:
+    """Samples, compiles and stacks `num_per_type` arms of each of `types`, in that order."""
+    chains, ids, numbers, starts = [], [], [], []
+    for robot_type in types:
+        hardware = sample_hardware(ranges, robot_type, num_per_type, seed, split)
+        variants = [{name: values[robot] for name, values in hardware.items()} for robot in range(num_per_type)]
+        chains += [read_chain(arm_spec(task, robot_type, variant).compile()) for variant in variants]
+        number = TYPES.index(robot_type)
+        ids.append(SPLITS[split] * SPLIT_STRIDE + number * TYPE_STRIDE + np.arange(num_per_type))
+        numbers += [number] * num_per_type
+        starts += [start_angles(task, robot_type)] * num_per_type
+    return make_chain_pool(CHAIN_TEMPLATES[task], chains, np.concatenate(ids), np.asarray(numbers), np.stack(starts))
+
+
+def make_chain_pool(
+    template: str, chains: Sequence[Chain], robot_id: np.ndarray, robot_type: np.ndarray, start_angles: np.ndarray
+) -> RobotPool:
+    """Compiles chains in their common template and stacks them.
+
+    Its `hardware` has, with zeros for missing joints: chain_pos [N, 8, 3] m and chain_quat [N, 8, 4], the frame of each joint
+    in that of the one before, then of the point of interest in the last joint's; joint_mask [N, 7]; joint_range [N, 7, 2] rad;
+    torque_limit [N, 7] N m; link_mass [N, 7] kg; damping, frictionloss, armature [N, 7]; type [N, 1], a position in `TYPES`;
+    start_angles [N, S, 7] rad, as given.
+    """
+    spec = mujoco.MjSpec.from_file(str(robots_path() / template))
+    models = []
+    for chain in chains:
+        edit_spec(spec, chain)
+        models.append(spec.compile())
+    names = ("joint_range", "torque_limit", "damping", "frictionloss", "armature")
+    hardware = {name: np.stack([chain.padded(name) for chain in chains]) for name in names}
+    hardware |= {
+        "chain_pos": np.stack([chain.padded("pos") for chain in chains]),
+        "chain_quat": np.stack([chain.padded("quat") for chain in chains]),
+        "joint_mask": np.asarray([np.arange(MAX_JOINTS) < chain.num_joints for chain in chains], np.float64),
+        "link_mass": np.stack([chain.padded("mass") for chain in chains]),
+        "type": np.asarray(robot_type, np.float64)[:, None],
+        "start_angles": np.asarray(start_angles, np.float64),
+    }
+    return RobotPool(
+        template=(robots_path() / template).read_text(),
+        fields=stack_models(models),
+        hardware=hardware,
+        robot_id=np.asarray(robot_id, np.int32),
+    )
