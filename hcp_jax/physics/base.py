@@ -19,11 +19,13 @@ MAX_VALUE = 1e10  # MuJoCo's mjMAXVAL: beyond it a state counts as diverged
 
 @struct.dataclass
 class PhysicsState:
-    """State of B worlds. qpos: [B, nq]; qvel, qacc_warmstart: [B, nv]. SI units, float32."""
+    """State of B worlds. qpos: [B, nq]; qvel, qacc_warmstart: [B, nv]; mocap_pos: [B, nmocap, 3], None where a template has no
+    mocap body. SI units, float32."""
 
     qpos: jax.Array
     qvel: jax.Array
     qacc_warmstart: jax.Array
+    mocap_pos: jax.Array | None = None
 
 
 class Physics(Protocol):

@@ -75,6 +75,8 @@ class MjxPhysics:
     def _step_world(self, model, state: PhysicsState, ctrl, *, num_worlds: int, num_substeps: int):
         data = self._make_data(num_worlds)
         data = data.replace(qpos=state.qpos, qvel=state.qvel, qacc_warmstart=state.qacc_warmstart, ctrl=ctrl)
+        if state.mocap_pos is not None:
+            data = data.replace(mocap_pos=state.mocap_pos)
 
         def substep(carry, _):
             data, overflow = carry
@@ -82,7 +84,7 @@ class MjxPhysics:
             return (data, overflow | self._overflow(data)), None
 
         (data, overflow), _ = jax.lax.scan(substep, (data, jnp.int32(0)), None, length=num_substeps)
-        return PhysicsState(data.qpos, data.qvel, data.qacc_warmstart), overflow
+        return state.replace(qpos=data.qpos, qvel=data.qvel, qacc_warmstart=data.qacc_warmstart), overflow
 
     def _make_data(self, num_worlds: int) -> mjx.Data:
         if self._impl != "warp":

@@ -49,23 +49,20 @@ class NativePhysics:
             jax.ShapeDtypeStruct((), np.int32),
         )
 
-        def host_step(robot_id, qpos, qvel, warmstart, ctrl):
+        def host_step(robot_id, state, ctrl):
             with self._lock:
-                inputs = [np.asarray(array) for array in (robot_id, qpos, qvel, warmstart, ctrl)]
-                return self._host_step(num_substeps, *inputs)
+                return self._host_step(num_substeps, *jax.tree.map(np.asarray, (robot_id, state, ctrl)))
 
-        qpos, qvel, warmstart, overflow = jax.pure_callback(
-            host_step, shapes, robots.robot_id, state.qpos, state.qvel, state.qacc_warmstart, ctrl
-        )
-        return PhysicsState(qpos, qvel, warmstart), overflow
+        qpos, qvel, warmstart, overflow = jax.pure_callback(host_step, shapes, robots.robot_id, state, ctrl)
+        return state.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warmstart), overflow
 
-    def _host_step(self, num_substeps, robot_id, qpos, qvel, warmstart, ctrl):
+    def _host_step(self, num_substeps, robot_id, state, ctrl):
         num_worlds = len(robot_id)
         if num_worlds not in self._worlds:
             self._worlds[num_worlds] = _Worlds(self._models[0], num_worlds)
         worlds = self._worlds[num_worlds]
         rows = self._row_order[np.searchsorted(self._sorted_ids, robot_id)]
-        return worlds.step(self._models, rows, qpos, qvel, warmstart, ctrl, num_substeps)
+        return worlds.step(self._models, rows, state, ctrl, num_substeps)
 
 
 class _Worlds:
@@ -75,12 +72,19 @@ class _Worlds:
         self._batch = mujoco.batch.Batch(model, num_worlds, len(os.sched_getaffinity(0)))
         self._rows = np.full(num_worlds, -1)
 
-    def step(self, models, rows, qpos, qvel, warmstart, ctrl, num_substeps):
+    def step(self, models, rows, state, ctrl, num_substeps):
         batch = self._batch
         if not np.array_equal(rows, self._rows):
             batch.set_models([models[row] for row in rows])
             self._rows = rows.copy()
-        batch.qpos[:], batch.qvel[:], batch.qacc_warmstart[:], batch.ctrl[:] = qpos, qvel, warmstart, ctrl
+        batch.qpos[:], batch.qvel[:], batch.qacc_warmstart[:], batch.ctrl[:] = (
+            state.qpos,
+            state.qvel,
+            state.qacc_warmstart,
+            ctrl,
+        )
+        if state.mocap_pos is not None:
+            batch.mocap_pos[:] = state.mocap_pos
         batch.time[:] = 0
         batch.warning[:] = 0
         batch.step(nstep=num_substeps)

@@ -1,0 +1,84 @@
+"""Deterministic evaluation episodes of goal-conditioned tasks, which end at success, in one jitted call."""
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+
+from hcp_jax.envs.goal import GoalEnv
+from hcp_jax.physics.base import PhysicsOverflowError
+
+# (params, index [B], obs [B, O], goal [B, G]) -> action [B, A]
+GoalPolicyFn = Callable[..., jax.Array]
+
+
+@struct.dataclass
+class GoalEpisodes:
+    """One episode of each robot. index, success, final_distance [m], episode_length, diverged: [B]; desired_goal: [B, G];
+    overflow: []."""
+
+    index: jax.Array
+    desired_goal: jax.Array
+    success: jax.Array
+    final_distance: jax.Array
+    episode_length: jax.Array
+    diverged: jax.Array
+    overflow: jax.Array
+
+    def take(self, rows: slice | np.ndarray) -> "GoalEpisodes":
+        """The episodes at `rows`."""
+        per_robot = {name: getattr(self, name)[rows] for name in self.__dataclass_fields__ if name != "overflow"}
+        return self.replace(**per_robot)
+
+
+class GoalEvaluator:
+    """Plays episodes of chosen robots of a pool with the policy's action."""
+
+    def __init__(self, env: GoalEnv, policy: GoalPolicyFn):
+        self.env, self._policy = env, policy
+        self._play = jax.jit(self._play_episodes)
+
+    def __call__(self, params, index: np.ndarray, key: jax.Array) -> GoalEpisodes:
+        """Plays one episode of the robots at positions `index` [B].
+
+        Raises:
+            PhysicsOverflowError: the physics dropped contacts or constraints.
+        """
+        episodes = jax.device_get(self._play(params, jnp.asarray(index, jnp.int32), key))
+        if episodes.overflow:
+            raise PhysicsOverflowError(int(episodes.overflow))
+        return episodes
+
+    def _play_episodes(self, params, index, key) -> GoalEpisodes:
+        state = self.env.reset(key, index)
+        episodes = GoalEpisodes(
+            index=index,
+            desired_goal=state.desired_goal,
+            success=jnp.zeros(index.shape, bool),
+            final_distance=jnp.full(index.shape, jnp.inf),
+            episode_length=jnp.zeros(index.shape, jnp.int32),
+            diverged=jnp.zeros(index.shape, bool),
+            overflow=jnp.int32(0),
+        )
+
+        def is_going_on(carry):
+            _, episodes, step = carry
+            return (step < self.env.episode_length) & ~jnp.all(episodes.success | episodes.diverged)
+
+        def play(carry):
+            state, episodes, step = carry
+            alive = ~(episodes.success | episodes.diverged)
+            action = self._policy(params, index, state.obs, state.desired_goal)
+            state, transition = self.env.step(state, action)
+            episodes = episodes.replace(
+                success=episodes.success | (alive & transition.success & ~transition.diverged),
+                final_distance=jnp.where(alive, transition.distance, episodes.final_distance),
+                episode_length=episodes.episode_length + alive,
+                diverged=episodes.diverged | (alive & transition.diverged),
+                overflow=episodes.overflow + transition.overflow,
+            )
+            return state, episodes, step + 1
+
+        return jax.lax.while_loop(is_going_on, play, (state, episodes, jnp.int32(0)))[1]
