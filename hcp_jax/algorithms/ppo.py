@@ -14,7 +14,7 @@ take over and see v_h, which stands still from there on.
 
 import functools
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -73,6 +73,9 @@ class PPOState:
     model's units, which stand still after the identification; diverged: [N] int32 episodes that each robot lost to non-finite
     physics; overflow: [] int32 worlds that ever overflowed; sums: running sums of metrics since they were last read.
     """
+
+    # What a policy needs, and fitting v_h of new robots to it.
+    policy_fields: ClassVar = ("iteration", "params", "reserve", "obs_statistics", "model_statistics")
 
     iteration: jax.Array
     params: Any

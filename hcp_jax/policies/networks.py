@@ -1,4 +1,4 @@
-"""The networks of PPO: policy mean, value, and the forward model that grounds a learned hardware embedding."""
+"""The networks: of PPO, with the forward model that grounds a learned hardware embedding, and of DDPG."""
 
 from collections.abc import Sequence
 
@@ -57,3 +57,41 @@ class ActorCritic(nn.Module):
         """Touches every parameter; used for initialisation alone."""
         predicted = self.predict(obs, action, v_h) if self.with_forward_model else None
         return self.act(obs, v_h), self.value(obs, v_h), predicted
+
+
+class DeterministicActor(nn.Module):
+    """Actions in (-1, 1) from one vector: SELU layers, then tanh (paper, appendix, "Hyperparameters")."""
+
+    hidden_sizes: Sequence[int]
+    action_size: int
+    layer_norm: bool = False
+
+    @nn.compact
+    def __call__(self, inputs: jax.Array) -> jax.Array:
+        x = inputs
+        for i, size in enumerate(self.hidden_sizes):
+            x = selu_layer(x, size, f"hidden_{i}", self.layer_norm)
+        init = nn.initializers.variance_scaling(1e-4, "fan_in", "truncated_normal")
+        return jnp.tanh(nn.Dense(self.action_size, kernel_init=init, name="output")(x))
+
+
+class Critic(nn.Module):
+    """Action values: SELU layers, the action added at the second one (paper, appendix, "Hyperparameters"): [...]."""
+
+    hidden_sizes: Sequence[int]
+    layer_norm: bool = False
+
+    @nn.compact
+    def __call__(self, inputs: jax.Array, action: jax.Array) -> jax.Array:
+        x = inputs
+        for i, size in enumerate(self.hidden_sizes):
+            x = jnp.concatenate([x, action], axis=-1) if i == 1 else x
+            x = selu_layer(x, size, f"hidden_{i}", self.layer_norm)
+        init = nn.initializers.variance_scaling(1e-4, "fan_in", "truncated_normal")
+        return nn.Dense(1, kernel_init=init, name="output")(x)[..., 0]
+
+
+def selu_layer(x: jax.Array, size: int, name: str, layer_norm: bool) -> jax.Array:
+    """A dense layer with SELU, and LayerNorm before it if asked. Call inside a compact module."""
+    x = nn.Dense(size, name=name)(x)
+    return nn.selu(nn.LayerNorm(name=f"{name}_norm")(x) if layer_norm else x)

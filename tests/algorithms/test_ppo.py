@@ -1,21 +1,15 @@
 import dataclasses
-import importlib.util
-import pathlib
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from probe_envs import ProbeEnv
 
 from hcp_jax.algorithms.identification import standardize_embedding
 from hcp_jax.algorithms.ppo import PPO, clipped_surrogate, clipped_value_loss, label_params
 from hcp_jax.config import EmbeddingConfig, PPOConfig
 from hcp_jax.policies.conditioning import Embedding
-
-_spec = importlib.util.spec_from_file_location("probe_envs", pathlib.Path(__file__).with_name("probe_envs.py"))
-probe_envs = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(probe_envs)
-ProbeEnv = probe_envs.ProbeEnv
 
 NUM_ENVS = 16
 CONFIG = PPOConfig(

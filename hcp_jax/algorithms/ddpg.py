@@ -1,0 +1,288 @@
+"""DDPG with hindsight experience replay on a robot pool (paper, algorithm 3; Lillicrap et al. 2016).
+
+train(state, n):                         one jitted call, buffers donated
+  for each of n iterations:
+    collect                              one episode in each of num_envs worlds, in lockstep
+    add_episodes                         whole, with the robot's index instead of its v_h
+    for each of updates_per_iteration:   draw steps, relabel goals, reward them
+                                         critic towards r + gamma (1 - success) Q', actor up the critic
+                                         targets follow
+"""
+
+from typing import Any, ClassVar, Protocol
+
+import jax
+import jax.numpy as jnp
+import optax
+from brax.training.acme import running_statistics, specs
+from flax import struct
+
+from hcp_jax.algorithms.her import relabel_goals
+from hcp_jax.algorithms.replay import EpisodeBatch, Replay, StepSample, add_episodes, episode_shapes, init_replay, sample_steps
+from hcp_jax.config import DDPGConfig
+from hcp_jax.envs.goal import GoalState, GoalTransition
+from hcp_jax.policies.networks import Critic, DeterministicActor
+
+Params = dict[str, Any]  # {"actor": ..., "critic": ... with a leading axis of critics, "embedding": [N, K] or None}
+
+
+class Env(Protocol):
+    """What DDPG needs of an environment (`hcp_jax.envs.goal.GoalEnv`)."""
+
+    observation_size: int
+    action_size: int
+    goal_size: int
+    num_robots: int
+    episode_length: int
+
+    def reset(self, key: jax.Array, index: jax.Array) -> GoalState: ...
+    def step(self, state: GoalState, action: jax.Array) -> tuple[GoalState, GoalTransition]: ...
+    def compute_reward(
+        self, achieved_goal: jax.Array, desired_goal: jax.Array, action: jax.Array
+    ) -> tuple[jax.Array, jax.Array]: ...
+
+
+class NetworkInputs(Protocol):
+    """What DDPG needs of a conditioning (`hcp_jax.policies.goal_conditioning.GoalConditioning`)."""
+
+    size: int
+
+    def init(self, key: jax.Array) -> jax.Array | None: ...
+    def inputs(self, embedding: jax.Array | None, index: jax.Array, obs: jax.Array, goal: jax.Array) -> jax.Array: ...
+
+
+@struct.dataclass
+class DDPGState:
+    """Everything that training carries from one iteration to the next.
+
+    iteration: [] int32 iterations done; statistics: of the networks' inputs; diverged: [N] int32 episodes that each robot lost
+    to non-finite physics; overflow: [] int32; sums: running sums of metrics since they were last read.
+    """
+
+    policy_fields: ClassVar = ("iteration", "params", "statistics")
+
+    iteration: jax.Array
+    params: Any
+    target_params: Any
+    opt_state: Any
+    statistics: running_statistics.RunningStatisticsState
+    replay: Replay
+    key: jax.Array
+    diverged: jax.Array
+    overflow: jax.Array
+    sums: dict[str, jax.Array]
+
+
+LOSS_METRICS = ("critic_loss", "actor_loss", "q")
+SUMS = (*LOSS_METRICS, "iterations", "updates", "episodes", "successes", "final_distance")
+
+
+def zero_sums() -> dict[str, jax.Array]:
+    return {name: jnp.zeros(()) for name in SUMS}
+
+
+class DDPG:
+    """DDPG for one environment and one source of v_h. Holds no state of its own."""
+
+    def __init__(
+        self, env: Env, conditioning: NetworkInputs, config: DDPGConfig, num_envs: int, embedding_learning_rate: float
+    ):
+        """Args:
+        env: a goal-conditioned environment over a pool.
+        conditioning: builds the networks' inputs for the robots of that pool.
+        config: settings; `buffer_episodes` must be at least `num_envs`.
+        num_envs: episodes collected per iteration.
+        embedding_learning_rate: Adam's step for a learned v_h.
+        """
+        self.env, self.conditioning, self.config, self.num_envs = env, conditioning, config, num_envs
+        self.actor = DeterministicActor(config.hidden_sizes, env.action_size, config.layer_norm)
+        self.critic = Critic(config.hidden_sizes, config.layer_norm)
+        decay = optax.add_decayed_weights(config.critic_weight_decay, mask=mark_kernels)
+        self._optimizer = optax.multi_transform(
+            {
+                "actor": optax.adam(config.actor_learning_rate),
+                "critic": optax.chain(decay, optax.adam(config.critic_learning_rate)),
+                "embedding": optax.adam(embedding_learning_rate),
+            },
+            {"actor": "actor", "critic": "critic", "embedding": "embedding"},
+        )
+        self.train = jax.jit(self._train, donate_argnums=0)
+
+    def buffer_shapes(self) -> EpisodeBatch:
+        """Shapes of the replay buffer."""
+        env = self.env
+        return episode_shapes(
+            self.config.buffer_episodes, env.episode_length, env.observation_size, env.action_size, env.goal_size
+        )
+
+    def init(self, key: jax.Array) -> DDPGState:
+        """The state before the first iteration."""
+        key, key_actor, key_critic, key_embedding = jax.random.split(key, 4)
+        inputs, action = jnp.zeros((1, self.conditioning.size)), jnp.zeros((1, self.env.action_size))
+        keys = jax.random.split(key_critic, 2 if self.config.double_critic else 1)
+        params = {
+            "actor": self.actor.init(key_actor, inputs),
+            "critic": jax.vmap(self.critic.init, in_axes=(0, None, None))(keys, inputs, action),
+            "embedding": self.conditioning.init(key_embedding),
+        }
+        return DDPGState(
+            iteration=jnp.int32(0),
+            params=params,
+            target_params=jax.tree.map(jnp.copy, {name: params[name] for name in ("actor", "critic")}),
+            opt_state=self._optimizer.init(params),
+            statistics=running_statistics.init_state(specs.Array((self.conditioning.size,), jnp.float32)),
+            replay=init_replay(self.buffer_shapes()),
+            key=key,
+            diverged=jnp.zeros(self.env.num_robots, jnp.int32),
+            overflow=jnp.int32(0),
+            sums=zero_sums(),
+        )
+
+    def mean_action(
+        self, params: Params, statistics, conditioning: NetworkInputs, index: jax.Array, obs: jax.Array, goal: jax.Array
+    ) -> jax.Array:
+        """The policy without exploration, for robots at `index` [B] of the pool that `conditioning` stands for: [B, A]."""
+        inputs = conditioning.inputs(params["embedding"], index, obs, goal)
+        return self._act(params["actor"], self.normalize(inputs, statistics))
+
+    def normalize(self, inputs: jax.Array, statistics: running_statistics.RunningStatisticsState) -> jax.Array:
+        """The inputs as the networks see them."""
+        if not self.config.normalize_inputs:
+            return inputs
+        return running_statistics.normalize(inputs, statistics, max_abs_value=5.0)
+
+    def _train(self, state: DDPGState, num_iterations: jax.Array) -> DDPGState:
+        return jax.lax.fori_loop(0, num_iterations, lambda _, s: self._train_iteration(s), state)
+
+    def _train_iteration(self, state: DDPGState) -> DDPGState:
+        key, key_collect, key_update = jax.random.split(state.key, 3)
+        episodes, diverged, overflow, sums = self._collect(state, key_collect)
+        statistics = running_statistics.update(state.statistics, self._step_inputs(state.params["embedding"], episodes))
+        state = state.replace(
+            iteration=state.iteration + 1,
+            key=key,
+            statistics=statistics,
+            replay=add_episodes(state.replay, episodes),
+            diverged=state.diverged.at[episodes.index].add(diverged.astype(jnp.int32)),
+            overflow=state.overflow + overflow,
+            sums=state.sums | {name: state.sums[name] + value for name, value in sums.items()},
+        )
+        is_warm = state.replay.num_added >= self.config.warmup_episodes
+        return jax.lax.cond(is_warm, self._learn, lambda state, key: state, state, key_update)
+
+    def _collect(self, state: DDPGState, key: jax.Array) -> tuple[EpisodeBatch, jax.Array, jax.Array, dict]:
+        """Plays `num_envs` episodes with the exploring policy; also which diverged [B], overflows [] and metrics."""
+        key_robots, key_reset, key_steps = jax.random.split(key, 3)
+        first = self.env.reset(key_reset, draw_robots(key_robots, self.env.num_robots, self.num_envs))
+
+        def step(env_state: GoalState, key: jax.Array):
+            action = self._explore(state, env_state, key)
+            next_state, transition = self.env.step(env_state, action)
+            return next_state, (env_state.obs, env_state.achieved_goal, transition)
+
+        keys = jax.random.split(key_steps, self.env.episode_length)
+        last, (obs, achieved_goal, transitions) = jax.lax.scan(step, first, keys)
+        ended = jnp.cumsum(transitions.diverged, axis=0) > 0
+        episodes = EpisodeBatch(
+            obs=jnp.swapaxes(jnp.concatenate([obs, last.obs[None]]), 0, 1),
+            achieved_goal=jnp.swapaxes(jnp.concatenate([achieved_goal, last.achieved_goal[None]]), 0, 1),
+            action=jnp.swapaxes(transitions.action, 0, 1),
+            desired_goal=first.desired_goal,
+            index=first.index,
+            length=jnp.sum(~ended, axis=0, dtype=jnp.int32),
+        )
+        sums = {
+            "iterations": 1.0,
+            "episodes": float(self.num_envs),
+            "successes": jnp.sum(jnp.any(transitions.success, axis=0), dtype=jnp.float32),
+            "final_distance": jnp.sum(transitions.distance[-1]),
+        }
+        return episodes, ended[-1], jnp.sum(transitions.overflow), sums
+
+    def _explore(self, state: DDPGState, env_state: GoalState, key: jax.Array) -> jax.Array:
+        """The policy's action with Gaussian noise, or a uniform one: always while the buffer warms up."""
+        key_noise, key_uniform, key_choice = jax.random.split(key, 3)
+        mean = self.mean_action(
+            state.params, state.statistics, self.conditioning, env_state.index, env_state.obs, env_state.desired_goal
+        )
+        noisy = mean + self.config.exploration_noise * jax.random.normal(key_noise, mean.shape)
+        uniform = jax.random.uniform(key_uniform, mean.shape, minval=-1.0, maxval=1.0)
+        is_warm = state.replay.num_added >= self.config.warmup_episodes
+        share = jnp.where(is_warm, self.config.random_action_probability, 1.0)
+        is_random = jax.random.uniform(key_choice, (mean.shape[0], 1)) < share
+        return jnp.clip(jnp.where(is_random, uniform, noisy), -1.0, 1.0)
+
+    def _step_inputs(self, embedding: jax.Array | None, episodes: EpisodeBatch) -> jax.Array:
+        """The networks' inputs at every step of new episodes: [B, T, size]."""
+        obs = episodes.obs[:, :-1]
+        index = jnp.broadcast_to(episodes.index[:, None], obs.shape[:2])
+        goal = jnp.broadcast_to(episodes.desired_goal[:, None], (*obs.shape[:2], self.env.goal_size))
+        return self.conditioning.inputs(embedding, index, obs, goal)
+
+    def _learn(self, state: DDPGState, key: jax.Array) -> DDPGState:
+        """All updates of one iteration."""
+
+        def update(carry, key):
+            params, target_params, opt_state = carry
+            key_sample, key_goals = jax.random.split(key)
+            sample = sample_steps(state.replay, key_sample, self.config.batch_size)
+            goal = relabel_goals(state.replay, sample, key_goals, self.config.relabel, self.config.future_k)
+            grads, metrics = jax.grad(self._loss, has_aux=True)(params, target_params, state.statistics, sample, goal)
+            updates, opt_state = self._optimizer.update(grads, opt_state, params)
+            params: Any = optax.apply_updates(params, updates)
+            online = {name: params[name] for name in target_params}
+            target_params = optax.incremental_update(online, target_params, self.config.tau)
+            return (params, target_params, opt_state), metrics
+
+        keys = jax.random.split(key, self.config.updates_per_iteration)
+        carry, metrics = jax.lax.scan(update, (state.params, state.target_params, state.opt_state), keys)
+        params, target_params, opt_state = carry
+        sums = {name: state.sums[name] + jnp.sum(metrics[name]) for name in LOSS_METRICS}
+        sums["updates"] = state.sums["updates"] + self.config.updates_per_iteration
+        return state.replace(params=params, target_params=target_params, opt_state=opt_state, sums=state.sums | sums)
+
+    def _loss(self, params: Params, target_params: dict, statistics, sample: StepSample, goal: jax.Array):
+        """Critic and actor loss in one: no gradient of one reaches the other's network, both reach a learned v_h.
+
+        The actor's reaches it through the action alone, or v_h would drift to wherever the critic promises much.
+        """
+        frozen = jax.lax.stop_gradient(params)
+        reward, success = self.env.compute_reward(sample.achieved_goal, goal, sample.action)
+
+        def inputs(embedding, obs):
+            return self.normalize(self.conditioning.inputs(embedding, sample.index, obs, goal), statistics)
+
+        next_inputs = inputs(frozen["embedding"], sample.next_obs)
+        next_action = self._act(target_params["actor"], next_inputs)
+        next_value = jnp.min(self._values(target_params["critic"], next_inputs, next_action), axis=0)
+        target = reward + self.config.gamma * jnp.where(success, 0.0, next_value)
+        now = inputs(params["embedding"], sample.obs)
+        values = self._values(params["critic"], now, sample.action)
+        weight = sample.valid / jnp.maximum(jnp.sum(sample.valid), 1.0)
+        critic_loss = jnp.sum(jnp.square(values - target) * weight)
+        action = self._act(params["actor"], now)
+        actor_loss = -jnp.sum(self._values(frozen["critic"], jax.lax.stop_gradient(now), action)[0] * weight)
+        metrics = {"critic_loss": critic_loss, "actor_loss": actor_loss, "q": jnp.sum(values[0] * weight)}
+        return critic_loss + actor_loss, metrics
+
+    def _act(self, actor: Any, inputs: jax.Array) -> jax.Array:
+        """Actions of the actor: [B, A]."""
+        action: Any = self.actor.apply(actor, inputs)
+        return action
+
+    def _values(self, critic: Any, inputs: jax.Array, action: jax.Array) -> jax.Array:
+        """Action values of each critic: [C, B]."""
+        apply: Any = self.critic.apply
+        return jax.vmap(apply, in_axes=(0, None, None))(critic, inputs, action)
+
+
+def draw_robots(key: jax.Array, num_robots: int, num_envs: int) -> jax.Array:
+    """Robots for `num_envs` episodes, none twice before each was drawn once: [B] int32."""
+    keys = jax.random.split(key, -(-num_envs // num_robots))
+    rows = jax.vmap(lambda key: jax.random.permutation(key, num_robots))(keys)
+    return rows.reshape(-1)[:num_envs].astype(jnp.int32)
+
+
+def mark_kernels(params: Any) -> Any:
+    """True at the kernels of dense layers."""
+    return jax.tree_util.tree_map_with_path(lambda path, _: getattr(path[-1], "key", None) == "kernel", params)

@@ -1,0 +1,74 @@
+"""What the networks of a goal-conditioned arm policy see: observation, goal, v_h, and features that follow from v_h.
+
+| encoding | length beyond observation (14) and goal (3) | content |
+|---|---|---|
+| those of `hcp_jax.hardware.arm_encodings` | as there | a constant of the robot |
+| `chain_fk` | 48 + 54 | `chain`, and what it says at the observed joint angles: positions and axes of the joints, position and rotation of the end effector in the world (what the released code feeds) |
+| `embedding` | its size | learned with the policy (HCP-I) |
+| `none+end_effector` | 3 | no v_h, but the end effector's position: a control |
+| `none+goal_offset` | 3 | no v_h, but end effector minus goal: a control |
+"""  # noqa: E501
+
+import jax
+import jax.numpy as jnp
+
+from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS, encode_arms
+from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
+from hcp_jax.hardware.pool import RobotPool
+from hcp_jax.policies.conditioning import Embedding
+
+POSE_FEATURES = {"chain_fk": 54, "none+end_effector": 3, "none+goal_offset": 3}
+GOAL_CONDITIONINGS = (*ARM_ENCODINGS, *POSE_FEATURES, "embedding")
+NUM_JOINTS = 7
+
+
+class GoalConditioning:
+    """Builds the networks' input for the robots of one pool."""
+
+    def __init__(
+        self,
+        pool: RobotPool,
+        encoding: str,
+        reference: RobotPool,
+        observation_size: int,
+        goal_size: int,
+        embedding: Embedding | None = None,
+    ):
+        """Args:
+        pool: the robots that `index` will name.
+        encoding: one of `GOAL_CONDITIONINGS`.
+        reference: the training robots, whose ranges scale dynamics.
+        embedding: the learned table, for `embedding`.
+        """
+        self.encoding, self._embedding = encoding, embedding
+        self.is_learned = embedding is not None
+        static = {"chain_fk": "chain", "none+end_effector": "none", "none+goal_offset": "none", "embedding": "none"}
+        self._table = jnp.asarray(encode_arms(pool, static.get(encoding, encoding), reference))
+        self._chain_pos = jnp.asarray(pool.hardware["chain_pos"], jnp.float32)
+        self._chain_rotation = quat_to_matrix(jnp.asarray(pool.hardware["chain_quat"], jnp.float32))
+        self._joint_mask = jnp.asarray(pool.hardware["joint_mask"], jnp.float32)
+        v_h_size = embedding.size if embedding is not None else self._table.shape[1]
+        self.size = observation_size + goal_size + v_h_size + POSE_FEATURES.get(encoding, 0)
+
+    def init(self, key: jax.Array) -> jax.Array | None:
+        """The embedding table, or None."""
+        return self._embedding.init(key) if self._embedding is not None else None
+
+    def inputs(self, embedding: jax.Array | None, index: jax.Array, obs: jax.Array, goal: jax.Array) -> jax.Array:
+        """The networks' input for robots at `index` [B], obs [B, 14], goal [B, 3]: [B, size]."""
+        v_h = self._table[index] if embedding is None else embedding[index]
+        return jnp.concatenate([obs, goal, v_h, *self._pose_features(index, obs[..., :NUM_JOINTS], goal)], axis=-1)
+
+    def _pose_features(self, index: jax.Array, angles: jax.Array, goal: jax.Array) -> list[jax.Array]:
+        if self.encoding not in POSE_FEATURES:
+            return []
+        positions, rotations = joint_poses(self._chain_pos[index], self._chain_rotation[index], angles)
+        end_effector = positions[..., -1, :]
+        if self.encoding == "none+end_effector":
+            return [end_effector]
+        if self.encoding == "none+goal_offset":
+            return [end_effector - goal]
+        mask = self._joint_mask[index][..., None]
+        flat = (*angles.shape[:-1], -1)
+        joints = [positions[..., :-1, :] * mask, rotations[..., :-1, :, 2] * mask]
+        return [part.reshape(flat) for part in (*joints, end_effector, rotations[..., -1, :, :])]

@@ -1,0 +1,139 @@
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from goal_probes import PlaneEnv, PlaneInputs
+
+from hcp_jax.algorithms.ddpg import DDPG, DDPGState, draw_robots, mark_kernels
+from hcp_jax.algorithms.replay import sample_steps
+from hcp_jax.config import ConfigError, DDPGConfig
+
+CONFIG = DDPGConfig(
+    hidden_sizes=(64, 64),
+    actor_learning_rate=1e-3,
+    critic_learning_rate=3e-3,
+    critic_weight_decay=0.0,
+    gamma=0.9,
+    tau=0.05,
+    batch_size=128,
+    buffer_episodes=200,
+    warmup_episodes=20,
+    updates_per_iteration=50,
+    exploration_noise=0.2,
+)
+
+
+def make(directions=(1.0,), learned=False, diverging=False, **changes) -> DDPG:
+    env = PlaneEnv(directions, diverging=diverging)
+    config = dataclasses.replace(CONFIG, **changes)
+    return DDPG(env, PlaneInputs(len(directions), learned), config, num_envs=10, embedding_learning_rate=3e-3)
+
+
+def success_rate(learner: DDPG, state: DDPGState, num_episodes: int = 200) -> float:
+    """Share of episodes without exploration that reach their goal."""
+    index = jnp.arange(num_episodes, dtype=jnp.int32) % learner.env.num_robots
+    env_state, reached = learner.env.reset(jax.random.key(7), index), jnp.zeros(num_episodes, bool)
+    for _ in range(learner.env.episode_length):
+        action = learner.mean_action(
+            state.params, state.statistics, learner.conditioning, index, env_state.obs, env_state.desired_goal
+        )
+        env_state, transition = learner.env.step(env_state, action)
+        reached |= transition.success
+    return float(reached.mean())
+
+
+def trained(learner: DDPG, num_iterations: int = 40) -> DDPGState:
+    return learner.train(learner.init(jax.random.key(0)), num_iterations)
+
+
+def test_a_sparse_goal_is_learned_with_hindsight_and_not_without():
+    with_hindsight, without = (make(relabel=relabel) for relabel in ("future", "none"))
+    assert success_rate(with_hindsight, trained(with_hindsight)) > 0.9
+    assert success_rate(without, trained(without)) < 0.7
+
+
+def test_robots_that_need_opposite_actions_are_solved_with_an_embedding_and_not_without():
+    directions = (1.0, -1.0)
+    embedded, blind = (make(directions, learned=learned, updates_per_iteration=100) for learned in (True, False))
+    assert success_rate(embedded, trained(embedded)) > 0.9
+    assert success_rate(blind, trained(blind)) < 0.7
+
+
+def test_the_value_of_a_success_is_its_reward_and_a_failure_is_discounted_for_ever():
+    learner = make(updates_per_iteration=400, critic_learning_rate=1e-2)
+    state = learner.init(jax.random.key(0))
+    replay = trained(learner, 3).replay
+    sample = sample_steps(replay, jax.random.key(1), 64)
+    hit, miss = sample.achieved_goal, jnp.full_like(sample.achieved_goal, 9.0)
+    params, optimiser, target = state.params, state.opt_state, state.target_params
+
+    @jax.jit
+    def update(params, optimiser, target, goal):
+        grads, _ = jax.grad(learner._loss, has_aux=True)(params, target, state.statistics, sample, goal)
+        updates, optimiser = learner._optimizer.update(grads, optimiser, params)
+        params = jax.tree.map(jnp.add, params, updates)
+        target = jax.tree.map(lambda t, p: t + 0.05 * (p - t), target, {k: params[k] for k in target})
+        return params, optimiser, target
+
+    for _ in range(600):
+        params, optimiser, target = update(params, optimiser, target, jnp.where(jnp.arange(64)[:, None] < 32, hit, miss))
+    inputs = learner.conditioning.inputs(None, sample.index, sample.obs, jnp.where(jnp.arange(64)[:, None] < 32, hit, miss))
+    values = learner._values(params["critic"], inputs, sample.action)[0]
+    cost = 0.05 * jnp.sum(jnp.square(sample.action), axis=-1)
+    np.testing.assert_allclose(values[:32], 1.0 - cost[:32], atol=0.3)
+    assert float(values[32:].mean()) < -7.0, "-1 in every step, gamma 0.9: -10 and the actions' cost"
+
+
+def test_the_same_seed_gives_the_same_result_in_one_call_or_two():
+    learner = make()
+    once, twice = trained(learner, 4), learner.train(trained(learner, 2), 2)
+    for one, other in zip(jax.tree.leaves(once.params), jax.tree.leaves(twice.params), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_nothing_is_learned_before_the_warm_up_and_all_actions_are_random():
+    learner = make(warmup_episodes=1000)
+    start = jax.tree.leaves(learner.init(jax.random.key(0)).params)
+    state = trained(learner, 3)
+    for before, after in zip(start, jax.tree.leaves(state.params), strict=True):
+        np.testing.assert_array_equal(before, after)
+    actions = state.replay.episodes.action[:30].reshape(-1)
+    np.testing.assert_allclose(jnp.histogram(actions, 4, (-1, 1))[0] / actions.size, 0.25, atol=0.06)
+
+
+def test_steps_after_a_divergence_are_not_stored_as_learnable_and_the_robot_is_named():
+    state = trained(make((1.0, 1.0), diverging=True), 2)
+    replay = state.replay
+    lengths = replay.episodes.length[:20]
+    np.testing.assert_array_equal(lengths, np.where(replay.episodes.index[:20] == 0, 2, 10))
+    np.testing.assert_array_equal(state.diverged, [int((replay.episodes.index[:20] == 0).sum()), 0])
+
+
+def test_two_critics_value_a_step_no_higher_than_one():
+    single, double = trained(make()), trained(make(double_critic=True))
+    assert jax.tree.leaves(double.params["critic"])[0].shape[0] == 2
+    inputs, action = jnp.zeros((1, 4)), jnp.zeros((1, 2))
+    assert make()._values(single.params["critic"], inputs, action).shape == (1, 1)
+
+
+def test_robots_are_drawn_without_favour(key):
+    drawn = draw_robots(key, 4, 10)
+    np.testing.assert_array_equal(np.sort(drawn[:4]), np.arange(4))
+    np.testing.assert_array_equal(np.sort(drawn[4:8]), np.arange(4))
+
+
+def test_weight_decay_is_on_kernels_alone():
+    params = make().init(jax.random.key(0)).params
+    marked = mark_kernels(params["actor"])["params"]["hidden_0"]
+    assert marked == {"kernel": True, "bias": False}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"future_k": -1}, {"relabel": "past"}, {"buffer_episodes": 0}, {"gamma": 1.5}, {"hidden_sizes": (8,)}],
+)
+def test_settings_out_of_range_name_themselves(changes):
+    with pytest.raises(ConfigError, match=f"ddpg.{next(iter(changes))}="):
+        DDPGConfig(**changes)
