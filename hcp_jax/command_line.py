@@ -91,7 +91,7 @@ def _run_experiment(path: str, function: str, kind: type):
 
 def apply_overrides(config: Config, overrides: Sequence[str]) -> Config:
     """A new config with the fields that `--config.FIELD=VALUE` arguments name. Raises ConfigError."""
-    known = field_names(Config)
+    known = field_names(config)
     for argument in overrides:
         match = _OVERRIDE.match(argument)
         if argument.startswith("-") and not match:

@@ -3,14 +3,20 @@
 import dataclasses
 import difflib
 import math
+import types
 import typing
 
+from hcp_jax.hardware.arm import TYPES
+from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS
 from hcp_jax.hardware.encodings import ENCODINGS
-from hcp_jax.hardware.ranges import HopperRanges
+from hcp_jax.hardware.ranges import ArmRanges, HopperRanges
 from hcp_jax.physics.base import INTEGRATORS, PHYSICS
 
-ALGORITHMS = ("ppo",)
-TASKS = ("hopper",)
+TASKS = ("hopper", "reacher", "peg_insertion")
+ALGORITHM_OF = {"hopper": "ppo", "reacher": "ddpg", "peg_insertion": "ddpg"}
+ARM_CONDITIONINGS = (*ARM_ENCODINGS, "chain_fk", "none+end_effector", "none+goal_offset", "embedding")
+INIT_LAYERS = ("hidden", "all")
+RELABEL_STRATEGIES = ("future", "final", "none")
 
 
 class ConfigError(ValueError):
@@ -55,6 +61,48 @@ class PoolConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class ArmPoolConfig:
+    """The arms. A pool depends on this record alone, never on the training seed.
+
+    Attributes:
+        types: robot types to train on (hcp_jax.hardware.arm).
+        left_out: types to evaluate zero-shot.
+        robots_per_type: training robots of each type (paper: 140).
+        heldout_per_type: robots of each type, also of those left out, that are never trained on.
+        seed: seed of the robots' hardware.
+        split: `train`, or `new` for robots that no other pool of this seed contains (fine-tuning).
+        ranges: where the hardware is drawn from.
+    """
+
+    types: tuple[str, ...] = tuple("ABCDEFGI")
+    left_out: tuple[str, ...] = ("H",)
+    robots_per_type: int = 140
+    heldout_per_type: int = 25
+    seed: int = 0
+    split: str = "train"
+    ranges: ArmRanges = ArmRanges()
+
+    def __post_init__(self):
+        for field, least in (("types", 1), ("left_out", 0)):
+            value = getattr(self, field)
+            _require(len(value) >= least, f"pool.{field}", value, f"at least {least} types")
+            for name in value:
+                _require(name in TYPES, f"pool.{field}", name, f"types out of {', '.join(TYPES)}")
+            _require(len(set(value)) == len(value), f"pool.{field}", value, "no type twice")
+        for field in ("robots_per_type", "heldout_per_type"):
+            _require(getattr(self, field) >= 1, f"pool.{field}", getattr(self, field), "at least 1")
+        _require(self.split in ("train", "new"), "pool.split", self.split, "'train' or 'new'")
+
+    @property
+    def num_robots(self) -> int:
+        return len(self.types) * self.robots_per_type
+
+    @property
+    def num_heldout(self) -> int:
+        return len({*self.types, *self.left_out}) * self.heldout_per_type
+
+
+@dataclasses.dataclass(frozen=True)
 class HopperConfig:
     """The hopper task.
 
@@ -69,6 +117,34 @@ class HopperConfig:
     def __post_init__(self):
         _require(self.episode_length >= 1, "env.episode_length", self.episode_length, "at least 1")
         _require(self.integrator in INTEGRATORS, "env.integrator", self.integrator, f"one of {', '.join(INTEGRATORS)}")
+
+
+@dataclasses.dataclass(frozen=True)
+class ArmConfig:
+    """The arm's tasks.
+
+    Attributes:
+        integrator: `rk4` (1 ms, released code), `euler` (1 ms) or `implicitfast` (4 ms).
+        random_hole: side of the cube [m] in which the hole is placed (paper: 0.2); 0 keeps it where it is.
+        episode_length: control steps per episode (paper: 200).
+        observation_noise: half-width of the uniform noise on joint angles [rad] and velocities [rad/s].
+        success_distance: of the point of interest from the goal [m].
+        action_cost: weight of |action|^2 in the reward.
+    """
+
+    integrator: str = "implicitfast"
+    random_hole: float = 0.0
+    episode_length: int = 200
+    observation_noise: float = 0.02
+    success_distance: float = 0.02
+    action_cost: float = 0.1
+
+    def __post_init__(self):
+        _require(self.integrator in INTEGRATORS, "env.integrator", self.integrator, f"one of {', '.join(INTEGRATORS)}")
+        _require(self.episode_length >= 1, "env.episode_length", self.episode_length, "at least 1")
+        _require(_positive(self.success_distance), "env.success_distance", self.success_distance, "a number above 0")
+        for name in ("random_hole", "observation_noise", "action_cost"):
+            _require(_at_least_zero(getattr(self, name)), f"env.{name}", getattr(self, name), "a number of at least 0")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,6 +205,66 @@ class PPOConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class DDPGConfig:
+    """DDPG with hindsight experience replay. The defaults are the paper's (appendix, table "Hyperparameters for reacher and peg
+    insertion tasks"), exploration and warm-up those of the released code.
+
+    Attributes:
+        preset: name of the set of values that this one started from.
+        hidden_sizes: widths of the hidden layers of actor and critic; the action enters the critic at the second.
+        actor_learning_rate, critic_learning_rate: Adam's steps.
+        critic_weight_decay: L2 penalty on the critic's kernels.
+        gamma: discount per control step.
+        tau: step of the target networks towards the networks, per update.
+        batch_size: steps per update.
+        buffer_episodes: capacity of the replay buffer (paper: 1e6 steps, 5000 episodes of 200).
+        warmup_episodes: random episodes before the first update.
+        updates_per_iteration: updates after each iteration's `num_envs` episodes (paper: 100 after every episode).
+        relabel: HER's goals: `future`, `final` or `none`.
+        future_k: relabelled goals for each original one.
+        exploration_noise: standard deviation of the Gaussian added to actions.
+        random_action_probability: share of actions that are uniform instead.
+        layer_norm: LayerNorm before each SELU.
+        normalize_inputs: whiten the networks' inputs by running statistics.
+        double_critic: the target takes the smaller value of two critics (Fujimoto et al. 2018).
+    """
+
+    preset: str = "paper"
+    hidden_sizes: tuple[int, ...] = (128, 256, 256)
+    actor_learning_rate: float = 1e-4
+    critic_learning_rate: float = 1e-4
+    critic_weight_decay: float = 1e-3
+    gamma: float = 0.99
+    tau: float = 0.01
+    batch_size: int = 128
+    buffer_episodes: int = 5_000
+    warmup_episodes: int = 50
+    updates_per_iteration: int = 100
+    relabel: str = "future"
+    future_k: int = 4
+    exploration_noise: float = 0.1
+    random_action_probability: float = 0.1
+    layer_norm: bool = False
+    normalize_inputs: bool = False
+    double_critic: bool = False
+
+    def __post_init__(self):
+        for name in ("batch_size", "buffer_episodes", "updates_per_iteration"):
+            _require(getattr(self, name) >= 1, f"ddpg.{name}", getattr(self, name), "at least 1")
+        for name in ("warmup_episodes", "future_k"):
+            _require(getattr(self, name) >= 0, f"ddpg.{name}", getattr(self, name), "at least 0")
+        for name in ("actor_learning_rate", "critic_learning_rate"):
+            _require(_positive(getattr(self, name)), f"ddpg.{name}", getattr(self, name), "a number above 0")
+        for name in ("critic_weight_decay", "exploration_noise"):
+            _require(_at_least_zero(getattr(self, name)), f"ddpg.{name}", getattr(self, name), "a number of at least 0")
+        for name in ("gamma", "tau", "random_action_probability"):
+            _require(0.0 <= getattr(self, name) <= 1.0, f"ddpg.{name}", getattr(self, name), "a number in [0, 1]")
+        _require(self.relabel in RELABEL_STRATEGIES, "ddpg.relabel", self.relabel, f"one of {', '.join(RELABEL_STRATEGIES)}")
+        sizes = self.hidden_sizes
+        _require(len(sizes) >= 2 and min(sizes) >= 1, "ddpg.hidden_sizes", sizes, "at least two sizes of at least 1")
+
+
+@dataclasses.dataclass(frozen=True)
 class EmbeddingConfig:
     """The learned v_h of HCP-I.
 
@@ -167,17 +303,19 @@ class Config:
 
     Attributes:
         name: default run folder, `runs/NAME`.
-        task: `hopper`.
-        algorithm: `ppo`.
+        task: `hopper`, `reacher` or `peg_insertion`.
+        algorithm: `ppo` for the hopper, `ddpg` for the arms.
         seed: seed of initialisation, training and evaluation noise.
         total_env_steps: control steps over all environments; rounded up to whole iterations.
         num_envs: parallel environments; 0 stands for the number of training robots.
         physics: `auto`, `mjx-warp`, `mjx-jax` or `native`.
-        encoding: v_h: `none`, `kinematics`, `kinematics+dynamics`, `random` or `embedding`.
+        encoding: v_h. Hopper: `none`, `kinematics`, `kinematics+dynamics`, `random` or `embedding`; arms: `none`, `chain`,
+            `chain_fk`, `dynamics`, `chain+dynamics`, `random`, `embedding`, `none+end_effector` or `none+goal_offset`.
         eval_every: control steps between evaluations, which also write a checkpoint; rounded to whole iterations.
-        eval_robots: robots of the training pool, and at most as many held-out ones, in an evaluation.
+        eval_robots: hoppers of the training pool, and at most as many held-out ones, in an evaluation.
         keep_checkpoints: newest checkpoints kept beside the best one.
-        init: run folder whose hidden layers and observation statistics this run starts from; empty starts from scratch.
+        init: run folder whose layers and observation statistics this run starts from; empty starts from scratch.
+        init_layers: `hidden` (paper, section 5.2) or `all` of that run's layers.
     """
 
     name: str
@@ -192,29 +330,47 @@ class Config:
     eval_robots: int = 100
     keep_checkpoints: int = 3
     init: str = ""
-    pool: PoolConfig = PoolConfig()
-    env: HopperConfig = HopperConfig()
+    init_layers: str = "hidden"
+    pool: PoolConfig | ArmPoolConfig = PoolConfig()
+    env: HopperConfig | ArmConfig = HopperConfig()
     ppo: PPOConfig = PPOConfig()
+    ddpg: DDPGConfig = DDPGConfig()
     embedding: EmbeddingConfig = EmbeddingConfig()
 
     def __post_init__(self):
         _require(bool(self.name), "name", self.name, "a non-empty name")
         for field, allowed in (
             ("task", TASKS),
-            ("algorithm", ALGORITHMS),
             ("physics", PHYSICS),
-            ("encoding", (*ENCODINGS, "embedding")),
+            ("init_layers", INIT_LAYERS),
+            ("algorithm", (ALGORITHM_OF.get(self.task, ""),)),
+            ("encoding", (*ENCODINGS, "embedding") if self.task == "hopper" else ARM_CONDITIONINGS),
         ):
             _require(getattr(self, field) in allowed, field, getattr(self, field), f"one of {', '.join(allowed)}")
         for field in ("total_env_steps", "eval_every", "eval_robots", "keep_checkpoints"):
             _require(getattr(self, field) >= 1, field, getattr(self, field), "at least 1")
         _require(self.seed >= 0, "seed", self.seed, "at least 0")
         _require(self.num_envs >= 0, "num_envs", self.num_envs, "at least 0")
+        kinds = (PoolConfig, HopperConfig) if self.task == "hopper" else (ArmPoolConfig, ArmConfig)
+        for field, kind in zip(("pool", "env"), kinds, strict=True):
+            _require(isinstance(getattr(self, field), kind), field, getattr(self, field), f"{kind.__name__} for {self.task}")
+        if self.algorithm == "ppo":
+            self._check_minibatches()
+        else:
+            self._check_buffer()
+
+    def _check_minibatches(self) -> None:
         batch = self.batch_size
         if batch % self.ppo.num_minibatches:
             raise ConfigError(
                 f"ppo.num_minibatches={self.ppo.num_minibatches}: must divide num_envs * ppo.unroll_length = "
                 f"{self.resolved_num_envs} * {self.ppo.unroll_length} = {batch}"
+            )
+
+    def _check_buffer(self) -> None:
+        if self.ddpg.buffer_episodes < self.resolved_num_envs:
+            raise ConfigError(
+                f"ddpg.buffer_episodes={self.ddpg.buffer_episodes}: must hold one iteration's {self.resolved_num_envs} episodes"
             )
 
     @property
@@ -224,7 +380,8 @@ class Config:
     @property
     def batch_size(self) -> int:
         """Control steps per iteration."""
-        return self.resolved_num_envs * self.ppo.unroll_length
+        steps = self.ppo.unroll_length if self.algorithm == "ppo" else self.env.episode_length
+        return self.resolved_num_envs * steps
 
 
 def to_dict(config) -> dict:
@@ -256,15 +413,18 @@ def unknown_field(name: str, known: list[str]) -> str:
     return f"{name}: no such field; {hint}"
 
 
-def field_names(cls, path: str = "") -> list[str]:
-    """Dotted paths of all leaf fields of a dataclass of dataclasses."""
+def field_names(config, path: str = "") -> list[str]:
+    """Dotted paths of all leaf fields of a dataclass of dataclasses (a class without unions, or an instance)."""
     names = []
-    for name, hint in typing.get_type_hints(cls).items():
-        names += field_names(hint, f"{path}{name}.") if dataclasses.is_dataclass(hint) else [f"{path}{name}"]
+    for name, hint in typing.get_type_hints(type(config) if not isinstance(config, type) else config).items():
+        part = hint if isinstance(config, type) else getattr(config, name)
+        names += field_names(part, f"{path}{name}.") if dataclasses.is_dataclass(part) else [f"{path}{name}"]
     return names
 
 
 def _convert(hint, value, where: str):
+    if isinstance(hint, types.UnionType):
+        hint = _choose(typing.get_args(hint), value)
     if dataclasses.is_dataclass(hint):
         return from_dict(hint, value, f"{where}.")
     origin = typing.get_origin(hint)
@@ -278,3 +438,9 @@ def _convert(hint, value, where: str):
     if type(value) is not hint:
         raise ConfigError(f"{where}={value!r}: expected {hint.__name__}, not {type(value).__name__}")
     return value
+
+
+def _choose(kinds: tuple[type, ...], value) -> type:
+    """The dataclass out of `kinds` that has most of the fields in `value`."""
+    fields = set(value) if isinstance(value, dict) else set()
+    return max(kinds, key=lambda kind: len(fields & set(typing.get_type_hints(kind))))

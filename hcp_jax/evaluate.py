@@ -1,4 +1,4 @@
-"""`python -m hcp_jax.evaluate RUN [--trials 10] [--robots-per-trial 100] [--physics native-rk4] [--json FILE]`"""
+"""`python -m hcp_jax.evaluate RUN [--types H] [--trials 10] [--robots-per-trial 100] [--physics native-rk4] [--json FILE]`"""
 
 import pathlib
 
@@ -7,9 +7,12 @@ from rich.table import Table
 
 from hcp_jax import command_line
 from hcp_jax.config import ConfigError
+from hcp_jax.evaluation.arm_sweeps import evaluate_arms
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.sweeps import evaluate_folder
+from hcp_jax.hardware.arm import TYPES
 from hcp_jax.physics.base import INTEGRATORS, PHYSICS
+from hcp_jax.training.run_folder import read_config
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -19,7 +22,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--robots-per-trial", type=int, default=100)
     parser.add_argument("--physics", default="auto", choices=[*PHYSICS, *(f"native-{name}" for name in INTEGRATORS)])
     parser.add_argument("--fit-steps", type=int, help="control steps of each new robot for fitting its v_h (HCP-I); 0 skips it")
-    parser.add_argument("--types", nargs="*", help="robot types to evaluate (the hopper has one: hopper)")
+    parser.add_argument("--types", nargs="*", help="robot types to evaluate, A to J (the hopper has one: hopper)")
     parser.add_argument("--seed", type=int, default=0, help="seed of the initial states")
     parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
     parser.add_argument("--json", type=pathlib.Path, help="file to write the whole record to")
@@ -28,31 +31,41 @@ def main(arguments: list[str] | None = None) -> None:
         for name in ("trials", "robots_per_trial"):
             if getattr(options, name) < 1:
                 raise ConfigError(f"--{name.replace('_', '-')}={getattr(options, name)}: expected at least 1")
-        if options.types and options.types != ["hopper"]:
-            raise ConfigError(f"--types={' '.join(options.types)}: expected hopper")
+        task = read_config(options.run).task
+        known = ("hopper",) if task == "hopper" else TYPES
+        for name in options.types or ():
+            if name not in known:
+                raise ConfigError(f"--types={name}: expected types out of {', '.join(known)}")
         command_line.enable_compilation_cache()
-        record = evaluate_folder(
-            options.run,
-            options.trials,
-            options.robots_per_trial,
-            options.physics,
-            options.fit_steps,
-            options.seed,
-            options.best,
-        )
+        settings = {name: getattr(options, name) for name in ("trials", "robots_per_trial", "physics", "seed", "best")}
+        if task == "hopper":
+            record = evaluate_folder(options.run, fit_steps=options.fit_steps, **settings)
+        else:
+            record = evaluate_arms(options.run, types=options.types or (), **settings)
     print_table(record)
     if options.json:
         write_json(options.json, record)
 
 
 def print_table(record: dict) -> None:
-    """Shows the record's sets, one row each."""
+    """Shows the record's sets of hoppers or types of arms, one row each."""
     title = f"{record['run']}: {record['encoding']}, {record['checkpoint_env_steps']:,} steps, {record['physics']}"
     table = Table(title=f"{title}, {record['trials']} trials x {record['robots_per_trial']} robots")
-    for column in ("robots", "return", "std over trials", "episode length"):
-        table.add_column(column, justify="left" if column == "robots" else "right")
-    for name, values in record["sets"].items():
-        table.add_row(name, *(f"{values[key]:.1f}" for key in ("return_mean", "return_std", "episode_length_mean")))
+    if record["task"] == "hopper":
+        rows, columns = record["sets"], {"return": "return_mean", "std over trials": "return_std"}
+    else:
+        rows = {f"{name}{' (zero-shot)' * row['zero_shot']}": row for name, row in record["types"].items()}
+        columns = {
+            "success [%]": "success_mean",
+            "std over trials": "success_std",
+            "of reachable goals [%]": "reachable_success_mean",
+        }
+    columns |= {"episode length": "episode_length_mean"}
+    table.add_column("robots")
+    for column in columns:
+        table.add_column(column, justify="right")
+    for name, values in rows.items():
+        table.add_row(name, *("n/a" if values[key] is None else f"{values[key]:.1f}" for key in columns.values()))
     Console().print(table)
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from hcp_jax.evaluation.embedding import knn_r2, plot_embedding
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.summary import read_curve, read_run_commit, steps_to_reach, summarise_runs
-from hcp_jax.experiment import make_experiment
+from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE
 from hcp_jax.training.policy_file import write_policy
 from hcp_jax.training.run_folder import CONFIG_FILE, ENVIRONMENT_FILE, read_config

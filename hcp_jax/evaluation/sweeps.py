@@ -6,9 +6,17 @@ import jax
 import numpy as np
 
 from hcp_jax.algorithms.ppo import PPOState
+from hcp_jax.config import PoolConfig
 from hcp_jax.envs.episodes import Episodes, Evaluator
 from hcp_jax.evaluation.statistics import robot_rows, summarise_trials
-from hcp_jax.experiment import EmbeddingFitter, Experiment, heldout_v_h, make_experiment, make_heldout_pool, train_v_h
+from hcp_jax.experiment.build import make_experiment
+from hcp_jax.experiment.hopper import (
+    EmbeddingFitter,
+    HopperExperiment,
+    heldout_v_h,
+    make_heldout_pool,
+    train_v_h,
+)
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.training import run_folder
 from hcp_jax.training.warm_start import load_state
@@ -45,6 +53,8 @@ def evaluate_folder(
     """
     config = run_folder.read_config(folder)
     run = make_experiment(config, physics)
+    assert isinstance(run, HopperExperiment)
+    assert isinstance(config.pool, PoolConfig)
     iteration, state = load_state(folder, run, best)
     count = trials * robots_per_trial
     heldout = make_heldout_pool(config.pool, count)
@@ -81,7 +91,7 @@ def evaluate_folder(
 
 
 def play_trials(
-    run: Experiment, state: PPOState, pool: RobotPool, rows: np.ndarray, v_h: jax.Array, trials: int, key: jax.Array
+    run: HopperExperiment, state: PPOState, pool: RobotPool, rows: np.ndarray, v_h: jax.Array, trials: int, key: jax.Array
 ) -> list[Episodes]:
     """One episode of each of `rows`, all in one jitted call, split into `trials` equal parts."""
 

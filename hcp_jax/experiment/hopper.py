@@ -1,31 +1,30 @@
-"""What a config stands for: pools, environments, learner and evaluator, built once and used by every command."""
+"""The hopper's experiments: PPO on a pool of hoppers, evaluated on robots trained on and on held-out ones."""
 
 import dataclasses
+import math
 from collections.abc import Callable
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from hcp_jax.algorithms.ppo import PPO, Params, PPOState, get_actor, put_actor
-from hcp_jax.config import Config, PoolConfig
+from hcp_jax.config import Config, HopperConfig, PoolConfig
 from hcp_jax.envs.base import PoolEnv
 from hcp_jax.envs.episodes import Episodes, Evaluator
 from hcp_jax.envs.hopper import Hopper
+from hcp_jax.experiment.base import EVALUATION_SEED, FIT, TRAIN
 from hcp_jax.hardware.encodings import encode
 from hcp_jax.hardware.hopper import make_hopper_pool
 from hcp_jax.hardware.pool import RobotPool, concatenate_pools
-from hcp_jax.physics.base import default_physics, make_physics
+from hcp_jax.physics.base import make_physics
 from hcp_jax.policies.conditioning import Conditioning, Embedding, Encoding
-
-# Purposes of random draws from the training seed, and the fixed seed of evaluation episodes.
-_TRAIN, _FIT = 0, 1
-_EVALUATION_SEED = 20180101
 
 
 @dataclasses.dataclass(frozen=True)
-class Experiment:
-    """A config's objects. `evaluation_pool` holds training robots 0..eval_robots-1, then the held-out ones."""
+class HopperExperiment:
+    """A config's objects. The evaluator's pool holds training robots 0..eval_robots-1, then as many held-out ones."""
 
     config: Config
     physics: str
@@ -35,6 +34,12 @@ class Experiment:
     make_env: Callable[[RobotPool], PoolEnv]
     evaluator: Evaluator
     num_iterations: int
+    fitter: "EmbeddingFitter | None" = None
+    best_metric: ClassVar[str] = "train_return_mean"
+
+    @property
+    def learner(self) -> PPO:
+        return self.ppo
 
     @property
     def num_evaluated(self) -> int:
@@ -42,19 +47,55 @@ class Experiment:
         return min(self.config.eval_robots, self.train_pool.num_robots, self.heldout_pool.num_robots)
 
     def init_state(self) -> PPOState:
-        return self.ppo.init(jax.random.fold_in(jax.random.key(self.config.seed), _TRAIN))
+        return self.ppo.init(jax.random.fold_in(jax.random.key(self.config.seed), TRAIN))
+
+    def introduce(self, iteration: int) -> list[str]:
+        """Lines to say before training goes on from `iteration`."""
+        config = self.config
+        lines = [f"{config.resolved_num_envs} environments, physics {self.physics}, encoding {config.encoding}"]
+        if iteration < self.ppo.identify_iterations:
+            steps = self.ppo.identify_iterations * config.batch_size
+            lines.append(f"identifying robots for {steps:,} steps; after that the policy starts afresh and sees v_h")
+        return lines
+
+    def evaluate(self, state: PPOState) -> tuple[dict[str, float | None], str]:
+        """Metrics of one deterministic episode per evaluated robot, and what to say about them."""
+        trained, heldout = evaluate_run(self, state)
+        fitted = evaluate_run(self, state, self.fitter(state))[1] if self.fitter else None
+        metrics = summarise(trained, heldout, fitted)
+        line = f"return {metrics['train_return_mean']:.0f} on training robots, {metrics['heldout_return_mean']:.0f} held out"
+        if fitted is not None:
+            line += f", {metrics['heldout_fitted_return_mean']:.0f} held out with fitted v_h"
+        return metrics, line
+
+    def learner_metrics(self, state: PPOState) -> dict[str, float | int]:
+        """Means since the last evaluation."""
+        sums = {name: float(value) for name, value in state.sums.items()}
+        iterations, episodes = max(sums["iterations"], 1.0), sums["episodes"]
+        means = ("policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "prediction_loss")
+        return {
+            "episode_return": sums["episode_return"] / episodes if episodes else math.nan,
+            "episode_length": sums["episode_length"] / episodes if episodes else math.nan,
+            **{name: sums[name] / iterations for name in means},
+            "explained_variance": 1.0 - sums["value_error"] / max(sums["target_variance"], 1e-12),
+        }
+
+    def describe(self, state: PPOState) -> str:
+        """The return of training episodes since the last evaluation, for the progress line."""
+        episodes = float(state.sums["episodes"])
+        return f"return {float(state.sums['episode_return']) / episodes:>6.0f}" if episodes else "return    n/a"
 
 
-def make_experiment(config: Config, physics: str | None = None) -> Experiment:
+def make_hopper_experiment(config: Config, physics: str) -> HopperExperiment:
     """Builds the pools, compiles the robots and sets up learner and evaluator.
 
     Args:
         config: the run's settings.
-        physics: overrules `config.physics`; may also be `native-INTEGRATOR`.
+        physics: the engine, may be `native-INTEGRATOR`.
     """
-    physics = physics or config.physics
-    physics = default_physics() if physics == "auto" else physics
     pool_config = config.pool
+    assert isinstance(pool_config, PoolConfig)
+    assert isinstance(config.env, HopperConfig)
     train_pool = make_hopper_pool(pool_config.ranges, pool_config.num_robots, pool_config.seed, pool_config.split)
     heldout_pool = make_heldout_pool(pool_config, pool_config.num_heldout)
     task = Hopper(config.env.episode_length)
@@ -81,7 +122,10 @@ def make_experiment(config: Config, physics: str | None = None) -> Experiment:
         return ppo.mean_action(network, statistics, obs, v_h)
 
     evaluator = Evaluator(make_env(evaluation_pool), policy)
-    return Experiment(config, physics, train_pool, heldout_pool, ppo, make_env, evaluator, num_iterations)
+    run = HopperExperiment(config, physics, train_pool, heldout_pool, ppo, make_env, evaluator, num_iterations)
+    if ppo.conditioning.is_learned and config.embedding.fit_steps:
+        run = dataclasses.replace(run, fitter=EmbeddingFitter(run, heldout_pool, config.embedding.fit_steps))
+    return run
 
 
 def make_heldout_pool(pool_config: PoolConfig, num_robots: int) -> RobotPool:
@@ -96,12 +140,12 @@ def make_conditioning(config: Config, train_pool: RobotPool) -> Conditioning:
     return Encoding(train_pool, config.encoding, train_pool)
 
 
-def train_v_h(run: Experiment, params: Params) -> jax.Array:
+def train_v_h(run: HopperExperiment, params: Params) -> jax.Array:
     """v_h of every training robot: [N, K]."""
     return run.ppo.conditioning.v_h(params["embedding"], jnp.arange(run.train_pool.num_robots))
 
 
-def heldout_v_h(run: Experiment, params: Params, pool: RobotPool | None = None) -> jax.Array:
+def heldout_v_h(run: HopperExperiment, params: Params, pool: RobotPool | None = None) -> jax.Array:
     """v_h of every robot of `pool`, by default the held-out one: [M, K].
 
     It is the robot's encoding or, where v_h is learned and so unknown, the mean over the training robots.
@@ -112,13 +156,13 @@ def heldout_v_h(run: Experiment, params: Params, pool: RobotPool | None = None) 
     return jnp.asarray(encode(pool, run.config.encoding, run.train_pool))
 
 
-def evaluate_run(run: Experiment, state: PPOState, heldout: jax.Array | None = None) -> tuple[Episodes, Episodes]:
+def evaluate_run(run: HopperExperiment, state: PPOState, heldout: jax.Array | None = None) -> tuple[Episodes, Episodes]:
     """One deterministic episode of each evaluated robot: those trained on, and held-out ones with v_h `heldout` [M, K]."""
     count = run.num_evaluated
     heldout = heldout_v_h(run, state.params) if heldout is None else heldout
     v_h = run.ppo.visible(state, jnp.concatenate([train_v_h(run, state.params)[:count], heldout[:count]]))
     policy_params = (state.params["network"], state.obs_statistics)
-    episodes = run.evaluator(policy_params, v_h, np.arange(2 * count), jax.random.key(_EVALUATION_SEED))
+    episodes = run.evaluator(policy_params, v_h, np.arange(2 * count), jax.random.key(EVALUATION_SEED))
     return episodes.take(slice(0, count)), episodes.take(slice(count, None))
 
 
@@ -129,7 +173,7 @@ class EmbeddingFitter:
     identified under, or it learns from policy and value loss.
     """
 
-    def __init__(self, run: Experiment, pool: RobotPool, steps_per_robot: int):
+    def __init__(self, run: HopperExperiment, pool: RobotPool, steps_per_robot: int):
         """Args:
         run: the experiment whose robots the networks were trained on.
         pool: the new robots.
@@ -140,7 +184,7 @@ class EmbeddingFitter:
         self._identify_iterations = run.ppo.identify_iterations
         self._num_robots = pool.num_robots
         self._num_iterations = max(1, round(env_steps / config.batch_size))
-        self._key = jax.random.fold_in(jax.random.key(config.seed), _FIT)
+        self._key = jax.random.fold_in(jax.random.key(config.seed), FIT)
         self._identified: jax.Array | None = None
         self._ppo = PPO(
             run.make_env(pool),
@@ -172,6 +216,16 @@ class EmbeddingFitter:
         if is_identified:  # what it depends on stands still from here on
             self._identified = v_h
         return v_h
+
+
+def summarise(trained: Episodes, heldout: Episodes, fitted: Episodes | None) -> dict[str, float | None]:
+    """Mean and standard deviation over robots of the deterministic return, and mean episode length."""
+    metrics: dict[str, float | None] = {}
+    for name, episodes in (("train", trained), ("heldout", heldout), ("heldout_fitted", fitted)):
+        metrics[f"{name}_return_mean"] = None if episodes is None else float(episodes.episode_return.mean())
+        metrics[f"{name}_return_std"] = None if episodes is None else float(episodes.episode_return.std())
+        metrics[f"{name}_episode_length"] = None if episodes is None else float(episodes.episode_length.mean())
+    return metrics
 
 
 def copy_tree(tree):

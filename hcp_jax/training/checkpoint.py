@@ -8,7 +8,7 @@ import jax
 import orbax.checkpoint as ocp
 from absl import logging as absl_logging
 
-from hcp_jax.algorithms.ppo import PPOState
+from hcp_jax.experiment.base import TrainingState
 
 
 class CheckpointError(RuntimeError):
@@ -31,7 +31,7 @@ class Checkpoints:
         handlers = {"state": ocp.StandardCheckpointHandler()}
         return ocp.CheckpointManager(self.folder / name, options=options, item_handlers=handlers)
 
-    def save(self, iteration: int, state: PPOState, is_best: bool = False) -> None:
+    def save(self, iteration: int, state: TrainingState, is_best: bool = False) -> None:
         """Starts writing in the background; the state's buffers may be donated as soon as this returns."""
         for manager in (self._newest, self._best) if is_best else (self._newest,):
             if iteration not in manager.all_steps():
@@ -53,14 +53,14 @@ class Checkpoints:
     def best(self) -> int | None:
         return self._best.latest_step()
 
-    def restore_best(self, template: PPOState) -> tuple[int, PPOState]:
+    def restore_best(self, template: TrainingState) -> tuple[int, TrainingState]:
         """The checkpoint with the highest return on training robots. Raises CheckpointError if there is none."""
         iteration = self.best()
         if iteration is None:
             raise CheckpointError(f"{self.folder}: holds no best checkpoint")
         return iteration, self._read_checked(self._best, template, iteration)
 
-    def restore(self, template: PPOState) -> tuple[int, PPOState, list[str]]:
+    def restore(self, template: TrainingState) -> tuple[int, TrainingState, list[str]]:
         """Reads the newest checkpoint that can be read. Damaged ones are moved aside, unless this is read-only.
 
         Returns:
@@ -91,23 +91,23 @@ class Checkpoints:
                 (self.folder / "newest" / str(iteration)).rename(aside)
             self._newest.reload()
 
-    def _read_checked(self, manager: ocp.CheckpointManager, template: PPOState, iteration: int) -> PPOState:
+    def _read_checked(self, manager: ocp.CheckpointManager, template: TrainingState, iteration: int) -> TrainingState:
         self._check_architecture(manager, template, iteration)
         return self._read(manager, template, iteration)
 
-    def _read(self, manager: ocp.CheckpointManager, template: PPOState, iteration: int) -> PPOState:
+    def _read(self, manager: ocp.CheckpointManager, template: TrainingState, iteration: int) -> TrainingState:
         abstract = jax.tree.map(ocp.utils.to_shape_dtype_struct, template)
         restored = manager.restore(iteration, args=ocp.args.Composite(state=ocp.args.StandardRestore(abstract)))
         return restored.state
 
-    def _check_architecture(self, manager: ocp.CheckpointManager, template: PPOState, iteration: int) -> None:
+    def _check_architecture(self, manager: ocp.CheckpointManager, template: TrainingState, iteration: int) -> None:
         metadata = manager.item_metadata(iteration).state
         saved = {leaf_name(path): tuple(leaf.shape) for path, leaf in jax.tree_util.tree_leaves_with_path(metadata.tree)
                  if hasattr(leaf, "shape")}  # fmt: skip
         check_architecture(saved, template, f"{self.folder}/{iteration}")
 
 
-def check_architecture(saved: Mapping[str, tuple[int, ...]], template: PPOState, where: str) -> None:
+def check_architecture(saved: Mapping[str, tuple[int, ...]], template: TrainingState, where: str) -> None:
     """Raises CheckpointError unless `saved`, shapes by name, has every parameter of `template` in its shape."""
     for path, leaf in jax.tree_util.tree_leaves_with_path(template.params):
         name = "params/" + leaf_name(path)

@@ -12,11 +12,13 @@ _SERIES = {
     "train_return_mean": "training robots",
     "heldout_return_mean": "held-out robots",
     "heldout_fitted_return_mean": "held-out robots, fitted v_h",
+    "train_types_success": "held-out robots of the training types",
+    "left_out_success": "types left out",
 }
 
 
 def plot_curves(folders: Sequence[pathlib.Path], path: pathlib.Path) -> None:
-    """Draws the evaluation returns of run folders over control steps into a PNG file."""
+    """Draws the evaluation returns or success rates of run folders over control steps into a PNG file."""
     figure = Figure(figsize=(7, 4.5), layout="constrained")
     axes = figure.subplots()
     for folder in folders:
@@ -27,7 +29,8 @@ def plot_curves(folders: Sequence[pathlib.Path], path: pathlib.Path) -> None:
                 x, y = np.asarray(points).T
                 axes.plot(x, y, marker="o", markersize=3, label=f"{folder.name}: {label}" if len(folders) > 1 else label)
     axes.set_xlabel("control steps [million]")
-    axes.set_ylabel("return of one episode")
+    is_goal_task = any("train_types_success" in row for folder in folders for row in read_rows(folder / METRICS_FILE)[:1])
+    axes.set_ylabel("success [%]" if is_goal_task else "return of one episode")
     axes.grid(alpha=0.3)
     axes.legend(frameon=False)
     figure.savefig(path, dpi=130)

@@ -3,7 +3,7 @@
 train(config, folder):
   build pools, compile                     said on the first lines
   until all iterations are done:
-    ppo.train(state, chunk)                one jitted call, a progress line after it
+    learner.train(state, chunk)              one jitted call, a progress line after it
     at every eval_every steps:             evaluate, metrics.csv, checkpoint
 """
 
@@ -14,12 +14,12 @@ import signal
 import threading
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
-from hcp_jax.algorithms.ppo import PPOState, zero_sums
 from hcp_jax.config import Config
-from hcp_jax.envs.episodes import Episodes
-from hcp_jax.experiment import EmbeddingFitter, Experiment, evaluate_run, make_experiment
+from hcp_jax.experiment.base import Experiment, TrainingState
+from hcp_jax.experiment.build import make_experiment
 from hcp_jax.physics.base import PhysicsOverflowError
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import Checkpoints
@@ -30,8 +30,6 @@ from hcp_jax.training.warm_start import load_init
 
 # Control steps between two progress lines: a few seconds of work.
 _CHUNK_ENV_STEPS = 250_000
-# The best checkpoint is the one with the highest of this: held-out robots choose nothing.
-_BEST = "train_return_mean"
 
 
 @dataclasses.dataclass
@@ -89,7 +87,7 @@ def train(config: Config, folder: pathlib.Path, resume: bool = False) -> dict[st
 
 
 class TrainingLoop:
-    """Drives `PPO.train` and everything around it."""
+    """Drives the learner's `train` and everything around it."""
 
     def __init__(self, run: Experiment, folder: pathlib.Path, checkpoints: Checkpoints, iteration: int):
         config = run.config
@@ -97,9 +95,6 @@ class TrainingLoop:
         self._batch_size = config.batch_size
         self._chunk = max(1, round(_CHUNK_ENV_STEPS / self._batch_size))
         self._eval_iterations = max(1, round(config.eval_every / self._batch_size))
-        self._fitter = None
-        if run.ppo.conditioning.is_learned and config.embedding.fit_steps:
-            self._fitter = EmbeddingFitter(run, run.heldout_pool, config.embedding.fit_steps)
         self._metrics = MetricsWriter(folder, self._env_steps)
         self._progress = Progress(run.num_iterations * self._batch_size, self._env_steps)
 
@@ -107,22 +102,18 @@ class TrainingLoop:
     def _env_steps(self) -> int:
         return self._iteration * self._batch_size
 
-    def run(self, state: PPOState, interrupt: Interrupt) -> dict[str, float] | None:
+    def run(self, state: TrainingState, interrupt: Interrupt) -> dict[str, float] | None:
         run, metrics = self._run, None
-        self._progress.say(
-            f"{run.config.resolved_num_envs} environments, physics {run.physics}, encoding {run.config.encoding}, "
-            f"on {jax.devices()[0].device_kind}; compiling the training step"
-        )
-        if self._iteration < run.ppo.identify_iterations:
-            steps = run.ppo.identify_iterations * self._batch_size
-            self._progress.say(f"identifying robots for {steps:,} steps; after that the policy starts afresh and sees v_h")
+        for line in run.introduce(self._iteration):
+            self._progress.say(line)
+        self._progress.say(f"on {jax.devices()[0].device_kind}; compiling the training step")
         while self._iteration < run.num_iterations:
             next_eval = min((self._iteration // self._eval_iterations + 1) * self._eval_iterations, run.num_iterations)
             count = min(self._chunk, next_eval - self._iteration)
-            state = run.ppo.train(state, count)
+            state = run.learner.train(state, count)
             self._iteration += count
             self._check(state)
-            self._progress.update(self._env_steps, describe_training(state))
+            self._progress.update(self._env_steps, run.describe(state))
             if self._iteration == next_eval:
                 state, metrics = self._evaluate(state)
             if interrupt.requested and self._iteration < run.num_iterations:
@@ -130,81 +121,47 @@ class TrainingLoop:
         self._finish(state)
         return metrics
 
-    def _check(self, state: PPOState) -> None:
+    def _check(self, state: TrainingState) -> None:
         overflow = int(state.overflow)
         if overflow:
             raise PhysicsOverflowError(overflow)
 
-    def _evaluate(self, state: PPOState) -> tuple[PPOState, dict[str, float]]:
+    def _evaluate(self, state: TrainingState) -> tuple[TrainingState, dict[str, float]]:
         run = self._run
-        trained, heldout = evaluate_run(run, state)
-        fitted = evaluate_run(run, state, self._fitter(state))[1] if self._fitter else None
-        metrics = {"env_steps": self._env_steps, **summarise(trained, heldout, fitted), **learner_metrics(state)}
+        evaluated, line = run.evaluate(state)
+        diverged = np.asarray(state.diverged)
+        counts = {"diverged_episodes": int(diverged.sum()), "diverged_robots": int((diverged > 0).sum())}
+        metrics = {"env_steps": self._env_steps, **evaluated, **run.learner_metrics(state), **counts}
         timing = {
             "env_steps": self._env_steps,
             "seconds": self._progress.elapsed,
             "steps_per_second": self._progress.steps_per_second(self._env_steps),
         }
-        state = state.replace(sums=zero_sums())
-        is_best = metrics[_BEST] >= max((float(row[_BEST]) for row in self._metrics.rows()), default=-math.inf)
+        state = state.replace(sums=jax.tree.map(jnp.zeros_like, state.sums))
+        best = max((float(row[run.best_metric]) for row in self._metrics.rows()), default=-math.inf)
+        is_best = metrics[run.best_metric] >= best
         # The row first: a resumed run drops rows after its checkpoint, but could not make up for one that is missing.
         self._metrics.write(metrics, timing)
         self._checkpoints.save(self._iteration, state, is_best)
-        line = f"return {metrics['train_return_mean']:.0f} on training robots, {metrics['heldout_return_mean']:.0f} held out"
-        if fitted is not None:
-            line += f", {metrics['heldout_fitted_return_mean']:.0f} held out with fitted v_h"
         self._progress.say(f"{self._env_steps:>12,} steps  {line}")
-        self._report_diverged(state)
+        self._report_diverged(diverged)
         return state, metrics
 
-    def _report_diverged(self, state: PPOState) -> None:
-        diverged = np.asarray(state.diverged)
+    def _report_diverged(self, diverged: np.ndarray) -> None:
         if diverged.any():
             rows = np.flatnonzero(diverged)
             worst = ", ".join(f"{self._run.train_pool.robot_id[row]} ({diverged[row]})" for row in rows[:5])
             self._progress.say(f"physics diverged in {diverged.sum()} episodes so far; robots (episodes): {worst}")
 
-    def _save_and_stop(self, state: PPOState) -> None:
+    def _save_and_stop(self, state: TrainingState) -> None:
         self._checkpoints.save(self._iteration, state)
         self._checkpoints.wait()
         self._metrics.close()
         self._progress.say(f"interrupted at {self._env_steps:,} steps; saved. Continue with --resume --out {self._folder}")
 
-    def _finish(self, state: PPOState) -> None:
+    def _finish(self, state: TrainingState) -> None:
         self._checkpoints.wait()
         self._checkpoints.close()
         self._metrics.close()
         plot_curves([self._folder], self._folder / "curves.png")
         self._progress.say(f"done in {format_seconds(self._progress.elapsed)}: {self._folder}")
-
-
-def summarise(trained: Episodes, heldout: Episodes, fitted: Episodes | None) -> dict[str, float | None]:
-    """Mean and standard deviation over robots of the deterministic return, and mean episode length."""
-    metrics: dict[str, float | None] = {}
-    for name, episodes in (("train", trained), ("heldout", heldout), ("heldout_fitted", fitted)):
-        metrics[f"{name}_return_mean"] = None if episodes is None else float(episodes.episode_return.mean())
-        metrics[f"{name}_return_std"] = None if episodes is None else float(episodes.episode_return.std())
-        metrics[f"{name}_episode_length"] = None if episodes is None else float(episodes.episode_length.mean())
-    return metrics
-
-
-def learner_metrics(state: PPOState) -> dict[str, float | int]:
-    """Means since the last evaluation, and counts of diverged episodes."""
-    sums = {name: float(value) for name, value in state.sums.items()}
-    iterations, episodes = max(sums["iterations"], 1.0), sums["episodes"]
-    diverged = np.asarray(state.diverged)
-    means = ("policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "prediction_loss")
-    return {
-        "episode_return": sums["episode_return"] / episodes if episodes else math.nan,
-        "episode_length": sums["episode_length"] / episodes if episodes else math.nan,
-        **{name: sums[name] / iterations for name in means},
-        "explained_variance": 1.0 - sums["value_error"] / max(sums["target_variance"], 1e-12),
-        "diverged_episodes": int(diverged.sum()),
-        "diverged_robots": int((diverged > 0).sum()),
-    }
-
-
-def describe_training(state: PPOState) -> str:
-    """The return of training episodes since the last evaluation, for the progress line."""
-    episodes = float(state.sums["episodes"])
-    return f"return {float(state.sums['episode_return']) / episodes:>6.0f}" if episodes else "return    n/a"

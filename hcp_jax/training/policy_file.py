@@ -6,23 +6,21 @@ import flax.serialization
 import jax
 import numpy as np
 
-from hcp_jax.algorithms.ppo import PPOState
+from hcp_jax.experiment.base import TrainingState
 from hcp_jax.training.checkpoint import CheckpointError, check_architecture, leaf_name
 
 POLICY_FILE = "policy.msgpack"
-# What of PPOState a policy needs, and what fitting v_h of new robots to it needs.
-_FIELDS = ("iteration", "params", "reserve", "obs_statistics", "model_statistics")
 
 
-def write_policy(folder: pathlib.Path, state: PPOState) -> pathlib.Path:
+def write_policy(folder: pathlib.Path, state: TrainingState) -> pathlib.Path:
     """Writes `policy.msgpack`: networks, embedding and statistics, float32. Returns its path."""
-    content = flax.serialization.to_state_dict({name: getattr(state, name) for name in _FIELDS})
+    content = flax.serialization.to_state_dict({name: getattr(state, name) for name in state.policy_fields})
     path = folder / POLICY_FILE
     path.write_bytes(flax.serialization.msgpack_serialize(jax.device_get(content)))
     return path
 
 
-def read_policy(folder: pathlib.Path, template: PPOState) -> PPOState:
+def read_policy(folder: pathlib.Path, template: TrainingState) -> TrainingState:
     """`template` with the policy put in.
 
     Raises:
@@ -31,9 +29,11 @@ def read_policy(folder: pathlib.Path, template: PPOState) -> PPOState:
     path = folder / POLICY_FILE
     try:
         content = flax.serialization.msgpack_restore(path.read_bytes())
-        fields = {name: content[name] for name in _FIELDS}
+        fields = {name: content[name] for name in template.policy_fields}
     except (ValueError, KeyError, TypeError) as error:
         raise CheckpointError(f"{path}: damaged ({type(error).__name__})") from error
     shapes = {leaf_name(path): np.shape(leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(fields)}
     check_architecture(shapes, template, str(path))
-    return template.replace(**flax.serialization.from_state_dict({name: getattr(template, name) for name in _FIELDS}, fields))
+    return template.replace(
+        **flax.serialization.from_state_dict({name: getattr(template, name) for name in template.policy_fields}, fields)
+    )

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from hcp_jax.algorithms.ppo import get_actor
-from hcp_jax.experiment import make_experiment
+from hcp_jax.config import ArmConfig, ArmPoolConfig, Config, DDPGConfig
+from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training import loop
-from hcp_jax.training.checkpoint import Checkpoints
+from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
 from hcp_jax.training.loop import Interrupt, TrainingLoop
 from hcp_jax.training.warm_start import load_init, load_state
 
@@ -125,6 +126,14 @@ def test_a_warm_start_takes_hidden_layers_and_leaves_output_layers_and_embedding
     )
 
 
+def test_a_warm_start_of_all_layers_takes_the_output_layers_too(finished, tiny_config):
+    config = dataclasses.replace(tiny_config, init=str(finished), init_layers="all")
+    run = make_experiment(config)
+    state, source = load_init(config)(run, run.init_state()), load_state(finished, run)[1]
+    trained = get_actor(source.params, source.obs_statistics).network
+    jax.tree.map(np.testing.assert_array_equal, state.reserve.network, trained)
+
+
 def test_a_warm_start_identifies_its_robots_under_the_old_actor_with_the_old_forward_model(warm):
     run, state, source = warm
     jax.tree.map(np.testing.assert_array_equal, get_actor(state.params, state.obs_statistics), source.reserve)
@@ -135,3 +144,63 @@ def test_a_warm_start_identifies_its_robots_under_the_old_actor_with_the_old_for
     jax.tree.map(np.testing.assert_array_equal, *models)
     np.testing.assert_array_equal(state.params["network"]["params"]["policy"]["hidden_1"]["kernel"], hidden)
     assert np.abs(np.asarray(state.params["embedding"]) - start).max() > 1e-3
+
+
+@pytest.fixture(scope="module")
+def tiny_arms() -> Config:
+    """DDPG on 4 arms of two types, small enough to train in seconds."""
+    return Config(
+        name="arms",
+        task="reacher",
+        algorithm="ddpg",
+        encoding="chain_fk",
+        total_env_steps=320,
+        eval_every=80,
+        num_envs=4,
+        pool=ArmPoolConfig(types=("A", "I"), left_out=("H",), robots_per_type=2, heldout_per_type=2),
+        env=ArmConfig(episode_length=10),
+        ddpg=DDPGConfig(hidden_sizes=(8, 8), buffer_episodes=10, warmup_episodes=8, updates_per_iteration=5, batch_size=16),
+    )
+
+
+@pytest.fixture(scope="module")
+def finished_arms(tiny_arms, tmp_path_factory) -> pathlib.Path:
+    folder = tmp_path_factory.mktemp("runs") / "arms"
+    loop.train(tiny_arms, folder)
+    return folder
+
+
+def test_an_arm_run_reports_success_of_training_types_and_of_the_type_left_out(finished_arms):
+    rows = metrics(finished_arms)
+    assert [int(row["env_steps"]) for row in rows] == [80, 160, 240, 320]
+    types = [name.removeprefix("success_") for name in rows[0] if name.startswith("success_")]
+    assert types == ["A", "I", "H"]
+    assert all(0.0 <= float(row["left_out_success"]) <= 100.0 for row in rows)
+    assert float(rows[-1]["critic_loss"]) > 0.0
+
+
+def test_a_resumed_arm_run_ends_as_the_uninterrupted_one_replay_buffer_included(finished_arms, tiny_arms, tmp_path):
+    folder = tmp_path / "arms"
+    loop.train(dataclasses.replace(tiny_arms, total_env_steps=160), folder)
+    loop.train(tiny_arms, folder, resume=True)
+    assert (folder / "metrics.csv").read_bytes() == (finished_arms / "metrics.csv").read_bytes()
+    run = make_experiment(tiny_arms)
+    one, other = (load_state(path, run)[1].replay for path in (folder, finished_arms))
+    jax.tree.map(np.testing.assert_array_equal, one, other)
+
+
+def test_arms_start_from_the_layers_of_another_run(finished_arms, tiny_arms):
+    config = dataclasses.replace(tiny_arms, init=str(finished_arms))
+    run = make_experiment(config)
+    state, source = load_init(config)(run, run.init_state()), load_state(finished_arms, run)[1]
+    actor, old = (params["actor"]["params"] for params in (state.params, source.params))
+    np.testing.assert_array_equal(actor["hidden_0"]["kernel"], old["hidden_0"]["kernel"])
+    assert not np.array_equal(actor["output"]["kernel"], old["output"]["kernel"])
+    jax.tree.map(np.testing.assert_array_equal, state.target_params["actor"], state.params["actor"])
+    config = dataclasses.replace(config, init_layers="all")
+    jax.tree.map(np.testing.assert_array_equal, load_init(config)(run, run.init_state()).params, source.params)
+
+
+def test_hoppers_do_not_start_from_an_arms_run(finished_arms, tiny_config):
+    with pytest.raises(CheckpointError, match="its task is 'reacher'"):
+        load_init(dataclasses.replace(tiny_config, init=str(finished_arms)))

@@ -1,0 +1,121 @@
+"""Evaluation of an arm run: success on new robots of each type, with what kept the others from it."""
+
+import pathlib
+from collections.abc import Sequence
+
+import jax
+import numpy as np
+
+from hcp_jax.config import ArmConfig, ArmPoolConfig, ConfigError
+from hcp_jax.envs.goal_episodes import GoalEpisodes
+from hcp_jax.experiment.arm import make_arm_experiment, make_evaluator, make_heldout_arms
+from hcp_jax.hardware.arm import TYPES
+from hcp_jax.hardware.inverse_kinematics import is_reachable
+from hcp_jax.hardware.pool import RobotPool
+from hcp_jax.physics.base import default_physics
+from hcp_jax.training import run_folder
+from hcp_jax.training.warm_start import load_state
+
+QUANTILES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0)
+
+
+def evaluate_arms(
+    folder: pathlib.Path,
+    trials: int,
+    robots_per_trial: int,
+    types: Sequence[str] = (),
+    physics: str = "auto",
+    seed: int = 0,
+    best: bool = False,
+) -> dict:
+    """Evaluates the newest checkpoint of a run folder, or its best one, on held-out robots 0..trials*robots_per_trial-1 of each
+    type, one episode each.
+
+    Args:
+        folder: a run folder.
+        trials, robots_per_trial: numbers of trials and of robots in each.
+        types: robot types; by default those trained on and those left out.
+        physics: engine, may be `native-INTEGRATOR`.
+        seed: seed of the episodes' goals, start poses and noise.
+        best: take the checkpoint with the highest success on held-out robots of the training types.
+
+    Returns:
+        The record that `evaluate --json` writes (DESIGN.md, "The command line"); success in percent, distances in m.
+
+    Raises:
+        RunFolderError, CheckpointError, ConfigError: the folder or a type cannot be evaluated.
+    """
+    config = run_folder.read_config(folder)
+    pools, env_config = config.pool, config.env
+    assert isinstance(pools, ArmPoolConfig)
+    assert isinstance(env_config, ArmConfig)
+    types = tuple(types) or tuple(dict.fromkeys((*pools.types, *pools.left_out)))
+    if config.task == "reacher" and "J" in types:
+        raise ConfigError("--types=J: the offset-free arm has a peg in its gripper; it is of peg_insertion alone")
+    physics = physics if physics != "auto" else config.physics
+    run = make_arm_experiment(config, default_physics() if physics == "auto" else physics)
+    iteration, state = load_state(folder, run, best)
+    upright = config.task == "peg_insertion"
+    record = {
+        "run": str(folder),
+        "task": config.task,
+        "algorithm": config.algorithm,
+        "encoding": config.encoding,
+        "physics": run.physics,
+        "integrator": run.physics.partition("-")[2] if run.physics.startswith("native-") else env_config.integrator,
+        "checkpoint_env_steps": iteration * config.batch_size,
+        "commit": run_folder.read_commit(),
+        "trials": trials,
+        "robots_per_trial": robots_per_trial,
+        "types": {},
+        "robots": [],
+    }
+    for name in types:
+        pool = make_heldout_arms(config, (name,), trials * robots_per_trial)
+        evaluator = make_evaluator(config, run.learner, run.make_env, pool, run.train_pool)
+        key_play, key_goal = jax.random.split(jax.random.fold_in(jax.random.key(seed), TYPES.index(name)))
+        episodes = evaluator((state.params, state.statistics), np.arange(pool.num_robots), key_play)
+        reachable = is_reachable(pool, np.asarray(episodes.desired_goal), env_config.success_distance, key_goal, upright)
+        record["types"][name] = {"zero_shot": name not in pools.types} | summarise_type(episodes, reachable, trials)
+        record["robots"] += [{"type": name} | row for row in robot_rows(pool, episodes, reachable)]
+    return record
+
+
+def summarise_type(episodes: GoalEpisodes, reachable: np.ndarray, trials: int) -> dict:
+    """Success over trials, and over the goals that the arm can reach at all."""
+    means = 100.0 * episodes.success.reshape(trials, -1).mean(axis=1)
+    within = episodes.success[reachable]
+    return {
+        "success_mean": float(means.mean()),
+        "success_std": float(means.std()),
+        "reachable_success_mean": 100.0 * float(within.mean()) if len(within) else None,
+        "reachable_share": 100.0 * float(reachable.mean()),
+        "final_distance_quantiles": {f"{q:g}": float(np.quantile(episodes.final_distance, q)) for q in QUANTILES},
+        "episode_length_mean": float(episodes.episode_length.mean()),
+    }
+
+
+def immovable_joints(pool: RobotPool) -> np.ndarray:
+    """Joints whose dry friction is above their torque limit: [N, 7] bool. Part of the task as published."""
+    return (pool.hardware["frictionloss"] > pool.hardware["torque_limit"]) & (pool.hardware["joint_mask"] > 0)
+
+
+def robot_rows(pool: RobotPool, episodes: GoalEpisodes, reachable: np.ndarray) -> list[dict]:
+    """One record per episode: robot id, outcome, goal, joints that cannot move, and its hardware in SI units."""
+    stuck = immovable_joints(pool)
+    return [
+        {
+            "robot_id": int(pool.robot_id[index]),
+            "success": bool(episodes.success[row]),
+            "final_distance": round(float(episodes.final_distance[row]), 5),
+            "episode_length": int(episodes.episode_length[row]),
+            "diverged": bool(episodes.diverged[row]),
+            "goal": [round(float(value), 5) for value in episodes.desired_goal[row]],
+            "goal_reachable": bool(reachable[row]),
+            "immovable_joints": np.flatnonzero(stuck[index]).tolist(),
+            "hardware": {
+                name: np.round(values[index], 6).tolist() for name, values in pool.hardware.items() if name != "start_angles"
+            },
+        }
+        for row, index in enumerate(episodes.index)
+    ]

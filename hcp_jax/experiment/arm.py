@@ -1,0 +1,163 @@
+"""The arm's experiments: DDPG with hindsight on a pool of arm types, evaluated on held-out variants and on types left out."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import ClassVar
+
+import jax
+import numpy as np
+
+from hcp_jax.algorithms.ddpg import DDPG, DDPGState
+from hcp_jax.algorithms.replay import replay_bytes
+from hcp_jax.config import ArmConfig, ArmPoolConfig, Config
+from hcp_jax.envs.arm import ArmTask
+from hcp_jax.envs.goal import GoalEnv
+from hcp_jax.envs.goal_episodes import GoalEpisodes, GoalEvaluator
+from hcp_jax.experiment.base import EVALUATION_SEED, TRAIN
+from hcp_jax.hardware.arm import TYPES
+from hcp_jax.hardware.arm_pool import make_arm_pool
+from hcp_jax.hardware.pool import RobotPool
+from hcp_jax.physics.base import make_physics
+from hcp_jax.policies.conditioning import Embedding
+from hcp_jax.policies.goal_conditioning import GoalConditioning
+
+
+@dataclasses.dataclass(frozen=True)
+class ArmExperiment:
+    """A config's objects. `heldout_pool` holds held-out variants of the training types, then of the types left out."""
+
+    config: Config
+    physics: str
+    train_pool: RobotPool
+    heldout_pool: RobotPool
+    learner: DDPG
+    make_env: Callable[[RobotPool], GoalEnv]
+    num_iterations: int
+    evaluator: GoalEvaluator
+    best_metric: ClassVar[str] = "train_types_success"
+
+    def init_state(self) -> DDPGState:
+        return self.learner.init(jax.random.fold_in(jax.random.key(self.config.seed), TRAIN))
+
+    def introduce(self, iteration: int) -> list[str]:
+        """Lines to say before training goes on."""
+        config, megabytes = self.config, replay_bytes(self.learner.buffer_shapes()) / 1e6
+        trained = [name for name in self.pool_config.left_out if name in self.pool_config.types]
+        warnings = [f"warning: type {name} is in pool.types and in pool.left_out: it is not zero-shot" for name in trained]
+        return [
+            *warnings,
+            f"{config.resolved_num_envs} environments, physics {self.physics}, encoding {config.encoding}",
+            f"replay buffer of {config.ddpg.buffer_episodes:,} episodes, {megabytes:,.0f} MB; as much in each checkpoint",
+        ]
+
+    def evaluate(self, state: DDPGState) -> tuple[dict[str, float | None], str]:
+        """Success in percent of one episode per held-out robot, by kind and by type, and what to say about it."""
+        params = (state.params, state.statistics)
+        episodes = self.evaluator(params, np.arange(self.heldout_pool.num_robots), jax.random.key(EVALUATION_SEED))
+        types = np.asarray([TYPES[int(number)] for number in self.heldout_pool.hardware["type"][:, 0]])
+        names = tuple(dict.fromkeys(types))
+        untrained = [name for name in names if name not in self.pool_config.types]
+        left_out = np.isin(types, untrained)
+        metrics = summarise("train_types", episodes.take(~left_out))
+        line = f"success {metrics['train_types_success']:.1f} % on held-out robots of the training types"
+        if left_out.any():
+            metrics |= summarise("left_out", episodes.take(left_out))
+            line += f", {metrics['left_out_success']:.1f} % zero-shot on type {', '.join(untrained)}"
+        for name in names:
+            metrics[f"success_{name}"] = 100.0 * float(episodes.success[types == name].mean())
+        return metrics, line
+
+    @property
+    def pool_config(self) -> ArmPoolConfig:
+        assert isinstance(self.config.pool, ArmPoolConfig)
+        return self.config.pool
+
+    def learner_metrics(self, state: DDPGState) -> dict[str, float | int]:
+        """Means since the last evaluation."""
+        sums = {name: float(value) for name, value in state.sums.items()}
+        updates, episodes = max(sums["updates"], 1.0), max(sums["episodes"], 1.0)
+        return {
+            "exploring_success": 100.0 * sums["successes"] / episodes,
+            "exploring_final_distance": sums["final_distance"] / episodes,
+            **{name: sums[name] / updates for name in ("critic_loss", "actor_loss", "q")},
+        }
+
+    def describe(self, state: DDPGState) -> str:
+        """Success of exploring episodes since the last evaluation, for the progress line."""
+        episodes = float(state.sums["episodes"])
+        return f"success {100.0 * float(state.sums['successes']) / episodes:>5.1f} %" if episodes else "success   n/a"
+
+
+def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:
+    """Builds the pools, compiles the arms and sets up learner and evaluator.
+
+    Args:
+        config: the run's settings.
+        physics: the engine, may be `native-INTEGRATOR`.
+    """
+    pools, env_config = config.pool, config.env
+    assert isinstance(pools, ArmPoolConfig)
+    assert isinstance(env_config, ArmConfig)
+    train_pool = make_arm_pool(config.task, pools.ranges, pools.types, pools.robots_per_type, pools.seed, pools.split)
+    heldout_pool = make_heldout_arms(config, tuple(dict.fromkeys((*pools.types, *pools.left_out))), pools.heldout_per_type)
+    task = ArmTask(config.task, **dataclasses.asdict(env_config))
+
+    def make_env(pool: RobotPool) -> GoalEnv:
+        integrator = physics.removeprefix("native-") if physics.startswith("native-") else env_config.integrator
+        stepped = dataclasses.replace(task, integrator=integrator)
+        return GoalEnv(stepped, pool, make_physics(physics, pool, stepped.sim_dt, integrator))
+
+    learner = DDPG(
+        make_env(train_pool),
+        make_goal_conditioning(config, train_pool, train_pool),
+        config.ddpg,
+        config.resolved_num_envs,
+        config.embedding.learning_rate,
+    )
+    num_iterations = -(-config.total_env_steps // config.batch_size)
+    evaluator = make_evaluator(config, learner, make_env, heldout_pool, train_pool)
+    return ArmExperiment(config, physics, train_pool, heldout_pool, learner, make_env, num_iterations, evaluator)
+
+
+def make_heldout_arms(config: Config, types: tuple[str, ...], num_per_type: int) -> RobotPool:
+    """Held-out robots 0..num_per_type-1 of each of `types`: no training pool of this seed contains them."""
+    pools = config.pool
+    assert isinstance(pools, ArmPoolConfig)
+    return make_arm_pool(config.task, pools.ranges, types, num_per_type, pools.seed, "heldout")
+
+
+def make_goal_conditioning(config: Config, pool: RobotPool, train_pool: RobotPool) -> GoalConditioning:
+    """The networks' inputs for robots of `pool`; a learned v_h has a row for each of them."""
+    embedding = None
+    if config.encoding == "embedding":
+        embedding = Embedding(pool.num_robots, config.embedding.size, config.embedding.initial_scale)
+    env = ArmTask(config.task)
+    return GoalConditioning(pool, config.encoding, train_pool, env.observation_size, env.goal_size, embedding)
+
+
+def make_evaluator(
+    config: Config, learner: DDPG, make_env: Callable[[RobotPool], GoalEnv], pool: RobotPool, train_pool: RobotPool
+) -> GoalEvaluator:
+    """Plays robots that were not trained on. Where v_h is learned, theirs is unknown: the mean of the training robots'."""
+    conditioning = make_goal_conditioning(config, pool, train_pool)
+
+    def policy(params, index, obs, goal):
+        networks, statistics = params
+        if conditioning.is_learned:
+            mean = networks["embedding"].mean(axis=0)
+            networks = networks | {"embedding": jax.numpy.tile(mean, (pool.num_robots, 1))}
+        return learner.mean_action(networks, statistics, conditioning, index, obs, goal)
+
+    return GoalEvaluator(make_env(pool), policy)
+
+
+def summarise(kind: str, episodes: GoalEpisodes) -> dict[str, float | None]:
+    """Success in percent, final distance and episode length of one kind of robots."""
+    if not len(episodes.index):
+        return {f"{kind}_success": math.nan}
+    return {
+        f"{kind}_success": 100.0 * float(episodes.success.mean()),
+        f"{kind}_final_distance": float(episodes.final_distance.mean()),
+        f"{kind}_episode_length": float(episodes.episode_length.mean()),
+    }
