@@ -1,7 +1,8 @@
 """Transfer to 100 new hoppers (paper, figure 4b): hidden layers from an HCP-I run, new embeddings. Preset: fast.
 
-Set `--config.init=runs/hopper_hcpi` to another run folder. `--config.init= --config.embedding.identify_steps=1_280_000` trains
-the same from scratch: without a forward model to start from, identification takes longer.
+Set `--config.init=runs/hopper_hcpi` to another run folder; `--config.init_layers=all` takes the output layers too.
+`--config.init= --config.embedding.identify_steps=1_280_000` trains the same from scratch: without a forward model to
+start from, identification takes longer.
 """
 
 import dataclasses

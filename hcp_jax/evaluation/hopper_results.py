@@ -77,27 +77,31 @@ def plot_groups(groups: Mapping[str, Sequence[pathlib.Path]], path: pathlib.Path
 
 
 def write_finetune(folders: Sequence[pathlib.Path], out: pathlib.Path) -> str:
-    """Steps at which runs from a pretrained one reach the final return of the runs from scratch."""
-    scratch = [folder for folder in folders if not read_config(folder).init]
-    pretrained = [folder for folder in folders if read_config(folder).init]
+    """Steps at which runs from a pretrained one reach the final return of the run from scratch of the same seed."""
+    configs = {folder: read_config(folder) for folder in folders}
+    scratch = {config.seed: folder for folder, config in configs.items() if not config.init}
+    groups: dict[str, list[pathlib.Path]] = {"from scratch": list(scratch.values())}
     rows = []
-    for folder in pretrained:
-        seed = read_config(folder).seed
-        for other in scratch:
-            if read_config(other).seed == seed:
-                curve = read_curve(other, "train_return_mean")
-                reached = steps_to_reach(folder, "train_return_mean", curve[-1, 1])
-                rows.append(
-                    {
-                        "seed": seed,
-                        "scratch_final_return": round(float(curve[-1, 1]), 1),
-                        "scratch_env_steps": int(curve[-1, 0]),
-                        "pretrained_final_return": round(float(read_curve(folder, "train_return_mean")[-1, 1]), 1),
-                        "pretrained_steps_to_scratch_final": reached,
-                    }
-                )
+    for folder, config in configs.items():
+        if not config.init or config.seed not in scratch:
+            continue
+        groups.setdefault(f"pretrained, {config.init_layers} layers", []).append(folder)
+        goal, curve = read_curve(scratch[config.seed], "train_return_mean")[-1], read_curve(folder, "train_return_mean")
+        rows.append(
+            {
+                "run": folder.name,
+                "seed": config.seed,
+                "init_layers": config.init_layers,
+                "scratch_final_return": round(float(goal[1]), 1),
+                "scratch_env_steps": int(goal[0]),
+                "pretrained_env_steps": int(curve[-1, 0]),
+                "pretrained_final_return": round(float(curve[-1, 1]), 1),
+                "pretrained_steps_to_scratch_final": steps_to_reach(folder, "train_return_mean", goal[1]),
+                "commit": read_run_commit(folder),
+            }
+        )
     write_json(out / "finetune.json", rows)
-    plot_groups({"from scratch": scratch, "pretrained": pretrained}, out / "finetune.png", ("train_return_mean",))
+    plot_groups(groups, out / "finetune.png", ("train_return_mean",))
     return f"{out}/finetune.json, {out}/finetune.png: {rows}"
 
 

@@ -6,8 +6,10 @@ import pytest
 
 from hcp_jax import collect, sweep
 from hcp_jax.config import to_dict
+from hcp_jax.evaluation.hopper_results import write_finetune
 from hcp_jax.evaluation.summary import read_curve, steps_to_reach
 from hcp_jax.evaluation.sweeps import evaluate_folder
+from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import CheckpointError
 from hcp_jax.training.metrics import MetricsWriter
 
@@ -92,3 +94,22 @@ def test_steps_to_reach_is_the_first_evaluation_at_or_above_the_value(tmp_path):
     assert read_curve(tmp_path, "r").tolist() == [[10, 1], [20, 5], [30, 3], [40, 6]]
     assert steps_to_reach(tmp_path, "r", 4.0) == 20
     assert steps_to_reach(tmp_path, "r", 7.0) is None
+
+
+def test_fine_tuning_reports_when_each_warm_start_reaches_what_scratch_ends_with(tiny_config, tmp_path):
+    runs = {
+        "scratch": ({}, [10.0, 50.0, 90.0]),
+        "hidden": ({"init": "x"}, [20.0, 80.0, 95.0]),
+        "all": ({"init": "x", "init_layers": "all"}, [91.0, 95.0, 99.0]),
+    }
+    for name, (changes, returns) in runs.items():
+        run_folder.write_start(tmp_path / name, dataclasses.replace(tiny_config, **changes), "native")
+        writer = MetricsWriter(tmp_path / name)
+        for i, value in enumerate(returns):
+            writer.write({"env_steps": 100 * (i + 1), "train_return_mean": value}, {"env_steps": 100 * (i + 1), "seconds": 1.0})
+        writer.close()
+    write_finetune([tmp_path / name for name in runs], tmp_path)
+    rows = json.loads((tmp_path / "finetune.json").read_text())
+    steps = {row["init_layers"]: row["pretrained_steps_to_scratch_final"] for row in rows}
+    assert steps == {"hidden": 300, "all": 100}
+    assert {row["scratch_final_return"] for row in rows} == {90.0}
