@@ -6,7 +6,7 @@ import math
 import types
 import typing
 
-from hcp_jax.hardware.arm import TYPES
+from hcp_jax.hardware.arm import OTHER_ARMS, TYPES
 from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS
 from hcp_jax.hardware.encodings import ENCODINGS
 from hcp_jax.hardware.ranges import ArmRanges, HopperRanges
@@ -354,6 +354,9 @@ class Config:
         kinds = (PoolConfig, HopperConfig) if self.task == "hopper" else (ArmPoolConfig, ArmConfig)
         for field, kind in zip(("pool", "env"), kinds, strict=True):
             _require(isinstance(getattr(self, field), kind), field, getattr(self, field), f"{kind.__name__} for {self.task}")
+        if isinstance(self.pool, ArmPoolConfig) and self.task == "reacher":
+            for name in (*self.pool.types, *self.pool.left_out):
+                _require(name not in OTHER_ARMS, "pool.types", name, "types A to I for the reacher (J and K hold a peg)")
         if self.algorithm == "ppo":
             self._check_minibatches()
         else:

@@ -22,7 +22,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--robots-per-trial", type=int, default=100)
     parser.add_argument("--physics", default="auto", choices=[*PHYSICS, *(f"native-{name}" for name in INTEGRATORS)])
     parser.add_argument("--fit-steps", type=int, help="control steps of each new robot for fitting its v_h (HCP-I); 0 skips it")
-    parser.add_argument("--types", nargs="*", help="robot types to evaluate, A to J (the hopper has one: hopper)")
+    parser.add_argument("--types", nargs="*", help="robot types to evaluate, A to K (the hopper has one: hopper)")
     parser.add_argument("--seed", type=int, default=0, help="seed of the initial states")
     parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
     parser.add_argument("--json", type=pathlib.Path, help="file to write the whole record to")

@@ -9,7 +9,7 @@ import numpy as np
 from hcp_jax.config import ArmConfig, ArmPoolConfig, ConfigError
 from hcp_jax.envs.goal_episodes import GoalEpisodes
 from hcp_jax.experiment.arm import make_arm_experiment, make_evaluator, make_heldout_arms
-from hcp_jax.hardware.arm import TYPES
+from hcp_jax.hardware.arm import OTHER_ARMS, TYPES
 from hcp_jax.hardware.inverse_kinematics import is_reachable
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.physics.base import default_physics
@@ -50,8 +50,9 @@ def evaluate_arms(
     assert isinstance(pools, ArmPoolConfig)
     assert isinstance(env_config, ArmConfig)
     types = tuple(types) or tuple(dict.fromkeys((*pools.types, *pools.left_out)))
-    if config.task == "reacher" and "J" in types:
-        raise ConfigError("--types=J: the offset-free arm has a peg in its gripper; it is of peg_insertion alone")
+    for name in types:
+        if config.task == "reacher" and name in OTHER_ARMS:
+            raise ConfigError(f"--types={name}: that arm holds a peg; it is of peg_insertion alone")
     physics = physics if physics != "auto" else config.physics
     run = make_arm_experiment(config, default_physics() if physics == "auto" else physics)
     iteration, state = load_state(folder, run, best)

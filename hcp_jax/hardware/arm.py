@@ -10,7 +10,7 @@ from hcp_jax.hardware.ranges import SPLITS, ArmRanges, sample_half_below_one, sa
 
 JOINTS = ("j0", "j1", "j2", "j3", "j4", "j5", "j6")
 BODIES = ("l0", "l1", "l2", "l3", "l4", "l5", "l6")
-# Joints that each type lacks (arm.json). J is another arm, without sideways offsets.
+# Joints that each type lacks (arm.json). J is another arm, without sideways offsets; K is that of the Fetch robot.
 REMOVED_JOINTS = {
     "A": ("j2", "j4"),
     "B": ("j2", "j6"),
@@ -22,10 +22,12 @@ REMOVED_JOINTS = {
     "H": ("j5",),
     "I": (),
     "J": ("j2", "j4"),
+    "K": (),
 }
 TYPES = tuple(REMOVED_JOINTS)
 ARM_TEMPLATES = {"reacher": "arm_reacher.xml", "peg_insertion": "arm_peg.xml"}
-STRAIGHT_ARM = "arm_straight_peg.xml"
+# Types of another template, which hold a peg: of peg insertion alone.
+OTHER_ARMS = {"J": "arm_straight_peg.xml", "K": "arm_fetch_peg.xml"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,10 +77,12 @@ def sample_hardware(ranges: ArmRanges, robot_type: str, num_robots: int, seed: i
 
 def arm_spec(task: str, robot_type: str, hardware: Hardware | None = None) -> mujoco.MjSpec:
     """One arm with its own joints, nominal or with `hardware`, rows of `sample_hardware`."""
-    name = STRAIGHT_ARM if robot_type == "J" else ARM_TEMPLATES[task]
+    name = OTHER_ARMS.get(robot_type, ARM_TEMPLATES[task])
     spec = mujoco.MjSpec.from_file(str(robots_path() / name))
     if hardware is not None:
-        edit_arm(spec, hardware)
+        if robot_type != "K":  # one robot that exists: its links are as long as they are
+            change_lengths(spec, hardware["length_change"])
+        change_dynamics(spec, hardware)
     for joint in REMOVED_JOINTS[robot_type]:
         if spec.joint(joint) is not None:
             spec.delete(spec.actuator(joint))
@@ -86,9 +90,9 @@ def arm_spec(task: str, robot_type: str, hardware: Hardware | None = None) -> mu
     return spec
 
 
-def edit_arm(spec: mujoco.MjSpec, hardware: Hardware) -> None:
-    """Writes one robot's hardware into an arm's spec. Inertias scale with the mass ratio alone (arm.json)."""
-    for change, effect in zip(hardware["length_change"], LINK_EFFECTS.values(), strict=True):
+def change_lengths(spec: mujoco.MjSpec, length_change: np.ndarray) -> None:
+    """Lengthens the links of an arm's spec by `length_change` [10] m; their inertias stay (arm.json)."""
+    for change, effect in zip(length_change, LINK_EFFECTS.values(), strict=True):
         body = spec.body(effect.child)
         position = np.array(body.pos)
         # A link grows away from 0; the offset-free arm has links of no length, which stay so.
@@ -96,6 +100,10 @@ def edit_arm(spec: mujoco.MjSpec, hardware: Hardware) -> None:
         position[effect.axis] += shift
         body.pos = position
         grow_geom(spec, effect, shift)
+
+
+def change_dynamics(spec: mujoco.MjSpec, hardware: Hardware) -> None:
+    """Writes masses and joint dynamics into an arm's spec. Inertias scale with the mass ratio (arm.json)."""
     for ratio, name in zip(hardware["mass_ratio"], BODIES, strict=True):
         body = spec.body(name)
         body.mass *= float(ratio)

@@ -60,7 +60,7 @@ def test_a_padded_arm_moves_as_the_arm_itself(robot_type):
     assert np.abs(expected).max() > 0.1
 
 
-@pytest.mark.parametrize("robot_type", ["A", "D", "H", "J"])
+@pytest.mark.parametrize("robot_type", ["A", "D", "H", "J", "K"])
 def test_a_padded_arm_moves_as_the_arm_itself_in_contact(robot_type):
     arm = with_table(drawn_arm("peg_insertion", robot_type)).compile()
     expected, contacts = shake(arm, arm.nu)
