@@ -129,7 +129,7 @@ def test_a_warm_start_takes_hidden_layers_and_leaves_output_layers_and_embedding
 def test_a_warm_start_of_all_layers_takes_the_output_layers_too(finished, tiny_config):
     config = dataclasses.replace(tiny_config, init=str(finished), init_layers="all")
     run = make_experiment(config)
-    state, source = load_init(config)(run, run.init_state()), load_state(finished, run)[1]
+    state, source = load_init(config)(run, run.init_state()), load_state(finished, make_experiment(tiny_config))[1]
     trained = get_actor(source.params, source.obs_statistics).network
     jax.tree.map(np.testing.assert_array_equal, state.reserve.network, trained)
 
