@@ -1,4 +1,4 @@
-"""Exp. I of the paper: reacher, trained on types A-G and I, tested zero-shot on H; HCP-E as released. Preset: fast."""
+"""Exp. I of the paper: reacher, random goals, type H left out; HCP-E as released. Preset: fast."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config

@@ -54,14 +54,14 @@ FAST_DDPG = DDPGConfig(
 )
 FAST_NUM_ENVS = 128
 ARM_TYPES = tuple("ABCDEFGHI")
+RANDOM_HOLE = 0.2  # [m] side of the cube of hole positions (paper, appendix, "Goal distributions")
 
 
-def arm(name: str, task: str, encoding: str, left_out: str = "", **changes) -> Config:
+def arm(name: str, task: str, encoding: str, left_out: str = "", random_hole: float = 0.0, **changes) -> Config:
     """An arm experiment with the `fast` preset that trains on types A to I without those in `left_out`.
 
     `changes` are fields of `Config`.
     """
-    pool = ArmPoolConfig(types=tuple(t for t in ARM_TYPES if t not in left_out), left_out=tuple(left_out))
     config = Config(
         name=name,
         task=task,
@@ -70,8 +70,8 @@ def arm(name: str, task: str, encoding: str, left_out: str = "", **changes) -> C
         total_env_steps=5_120_000,
         eval_every=256_000,
         num_envs=FAST_NUM_ENVS,
-        pool=pool,
-        env=ArmConfig(),
+        pool=ArmPoolConfig(types=tuple(t for t in ARM_TYPES if t not in left_out), left_out=tuple(left_out)),
+        env=ArmConfig(random_hole=random_hole),
         ddpg=FAST_DDPG,
     )
     return dataclasses.replace(config, **changes)

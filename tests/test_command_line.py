@@ -13,6 +13,7 @@ from hcp_jax.training import loop
 
 EXPERIMENTS = pathlib.Path(__file__).resolve().parents[1] / "experiments"
 HOPPER = str(EXPERIMENTS / "hopper_ppo.py")
+REACHER = str(EXPERIMENTS / "reacher_hcpe_leave_h.py")
 
 
 @pytest.mark.parametrize("path", sorted(EXPERIMENTS.glob("*.py")), ids=lambda path: path.stem)
@@ -61,6 +62,24 @@ BAD_ARGUMENTS = {
     "unknown encoding": (["--config", HOPPER, "--config.encoding=colour"], "encoding='colour': expected one of none"),
     "unknown physics": (["--config", HOPPER, "--config.physics=bullet"], "physics='bullet': expected one of auto"),
     "no robots": (["--config", HOPPER, "--config.pool.num_robots=0"], "pool.num_robots=0: expected at least 1"),
+    "unknown robot type": (
+        ["--config", REACHER, "--config.pool.types=('A','Q')"],
+        "pool.types='Q': expected types out of A, B",
+    ),
+    "an arm that holds a peg": (
+        ["--config", REACHER, "--config.pool.left_out=('K',)"],
+        "pool.types='K': expected types A to I",
+    ),
+    "buffer of less than a batch": (
+        ["--config", REACHER, "--config.ddpg.buffer_episodes=100"],
+        "ddpg.buffer_episodes=100: must hold",
+    ),
+    "negative k": (["--config", REACHER, "--config.ddpg.future_k=-1"], "ddpg.future_k=-1: expected at least 0"),
+    "hopper's v_h for an arm": (
+        ["--config", REACHER, "--config.encoding=kinematics"],
+        "encoding='kinematics': expected one of none",
+    ),
+    "algorithm of another task": (["--config", REACHER, "--config.algorithm=ppo"], "algorithm='ppo': expected one of ddpg"),
     "missing init": (["--config", HOPPER, "--config.init=nowhere"], "nowhere: no such run folder"),
     "resume of nothing": (["--config", HOPPER, "--resume"], "no such run folder"),
 }
@@ -149,7 +168,7 @@ def test_a_checkpoint_of_another_architecture_is_refused(finished_run, tiny_conf
 def test_evaluate_refuses_what_is_not_a_run_and_impossible_counts(finished_run, tmp_path, capsys):
     assert "no such run folder" in fails(capsys, evaluate.main, [str(tmp_path / "nowhere")])
     assert "--trials=0: expected at least 1" in fails(capsys, evaluate.main, [str(finished_run), "--trials", "0"])
-    assert "expected hopper" in fails(capsys, evaluate.main, [str(finished_run), "--types", "H"])
+    assert "--types=H: expected types out of hopper" in fails(capsys, evaluate.main, [str(finished_run), "--types", "H"])
     assert "--physics" in fails(capsys, evaluate.main, [str(finished_run), "--physics", "bullet"])
 
 

@@ -18,7 +18,7 @@ from hcp_jax.training.warm_start import load_state
 
 
 def collect(runs: pathlib.Path, results: pathlib.Path) -> list[str]:
-    """Writes into `results` from the run folders under `runs`; returns a line for each thing written.
+    """Writes into `results` from the hopper's run folders under `runs`; returns a line for each thing written.
 
     `hopper/summary.json` (a row per algorithm), `hopper/curves.png`, each run's metrics under `hopper/runs/` and its policy
     under `policies/`, `hopper/finetune.json` and `.png` if there are `hopper_finetune` runs, `hopper/embedding.json` and
@@ -26,6 +26,7 @@ def collect(runs: pathlib.Path, results: pathlib.Path) -> list[str]:
     """
     out = results / "hopper"
     folders = sorted(path.parent for path in runs.glob(f"*/{CONFIG_FILE}") if (path.parent / METRICS_FILE).exists())
+    folders = [folder for folder in folders if read_config(folder).task == "hopper"]
     by_name: dict[str, list[pathlib.Path]] = {}
     for folder in folders:
         by_name.setdefault(read_config(folder).name, []).append(folder)

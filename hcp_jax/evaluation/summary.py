@@ -11,14 +11,17 @@ from hcp_jax.config import Config
 from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE, read_rows
 from hcp_jax.training.run_folder import ENVIRONMENT_FILE, read_config
 
+BASELINES = {"ppo": "PPO", "ddpg": "DDPG+HER"}
 ALGORITHM_NAMES = {
-    "none": "PPO",
     "kinematics": "HCP-E",
     "kinematics+dynamics": "HCP-E+Dyn",
+    "chain": "HCP-E",
+    "chain_fk": "HCP-E",
+    "chain+dynamics": "HCP-E+Dyn",
     "embedding": "HCP-I",
-    "random": "PPO+random",
 }
 RETURNS = ("train_return", "heldout_return", "heldout_fitted_return")
+SUCCESSES = ("train_types_success", "left_out_success")
 
 
 def summarise_runs(folders: Sequence[pathlib.Path]) -> list[dict]:
@@ -26,7 +29,7 @@ def summarise_runs(folders: Sequence[pathlib.Path]) -> list[dict]:
 
     Returns:
         Rows with `algorithm`, `encoding`, `name`, `seeds`, `env_steps`, mean and standard deviation over seeds of each
-        return in `RETURNS`, `wall_seconds` (mean) and `commit`.
+        return in `RETURNS` (hopper) or success in percent in `SUCCESSES` (arms), `wall_seconds` (mean) and `commit`.
     """
     groups = collections.defaultdict(list)
     for folder in folders:
@@ -40,20 +43,29 @@ def summarise_runs(folders: Sequence[pathlib.Path]) -> list[dict]:
 def _summarise_group(name: str, env_steps: int, runs: list[tuple[Config, pathlib.Path, dict]]) -> dict:
     config = runs[0][0]
     row = {
-        "algorithm": ALGORITHM_NAMES[config.encoding],
+        "algorithm": name_algorithm(config),
         "encoding": config.encoding,
         "name": name,
         "seeds": sorted(run.seed for run, _, _ in runs),
         "env_steps": env_steps,
     }
-    for key in RETURNS:
-        values = [float(last[f"{key}_mean"]) for _, _, last in runs if last.get(f"{key}_mean")]
+    columns = {key: f"{key}_mean" for key in RETURNS} if config.task == "hopper" else {key: key for key in SUCCESSES}
+    for key, column in columns.items():
+        values = [float(last[column]) for _, _, last in runs if last.get(column)]
         row[f"{key}_mean"] = round(float(np.mean(values)), 1) if values else None
         row[f"{key}_std"] = round(float(np.std(values)), 1) if values else None
     seconds = [float(read_rows(folder / TIMING_FILE)[-1]["seconds"]) for _, folder, _ in runs]
     row["wall_seconds"] = round(float(np.mean(seconds)), 1)
     row["commit"] = sorted({read_run_commit(folder) for _, folder, _ in runs})
     return row
+
+
+def name_algorithm(config: Config) -> str:
+    """The paper's name of an algorithm with its v_h; controls are named after what they add to the baseline."""
+    baseline, encoding = BASELINES[config.algorithm], config.encoding
+    if encoding == "none":
+        return baseline
+    return ALGORITHM_NAMES.get(encoding, f"{baseline}+{encoding.removeprefix('none+')}")
 
 
 def read_run_commit(folder: pathlib.Path) -> str:

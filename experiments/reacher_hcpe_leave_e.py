@@ -1,0 +1,8 @@
+"""Exp. III of the paper: reacher, random goals, type E left out; HCP-E as released. Preset: fast."""
+
+from hcp_jax import presets
+from hcp_jax.config import Config
+
+
+def get_config() -> Config:
+    return presets.arm("reacher_hcpe_leave_e", "reacher", "chain_fk", left_out="E")
