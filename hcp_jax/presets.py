@@ -3,6 +3,7 @@
 import dataclasses
 
 from hcp_jax.config import ArmConfig, ArmPoolConfig, Config, DDPGConfig, EmbeddingConfig, HopperConfig, PPOConfig
+from hcp_jax.hardware.ranges import ArmRanges, nominal_lengths
 
 # Many environments, short unrolls: one environment per robot, 32 steps each. Rewards are scaled so that value targets are
 # of order 1, observations are whitened, the step size decays, and physics is integrated by Euler at 2 ms instead of RK4
@@ -55,6 +56,16 @@ FAST_DDPG = DDPGConfig(
 FAST_NUM_ENVS = 128
 ARM_TYPES = tuple("ABCDEFGHI")
 RANDOM_HOLE = 0.2  # [m] side of the cube of hole positions (paper, appendix, "Goal distributions")
+
+
+def only(robot_type: str, **changes) -> ArmPoolConfig:
+    """A pool of one arm type, evaluated on 100 held-out robots as the paper's curves are. `changes` are fields of the pool."""
+    return ArmPoolConfig(**{"types": (robot_type,), "left_out": (), "heldout_per_type": 100} | changes)
+
+
+def only_dynamics(**ranges) -> ArmPoolConfig:
+    """100 arms of type I with nominal links (paper, appendix, "Effect of Dynamics"). `ranges` are fields of `ArmRanges`."""
+    return only("I", robots_per_type=100, ranges=dataclasses.replace(nominal_lengths(ArmRanges()), **ranges))
 
 
 def arm(name: str, task: str, encoding: str, left_out: str = "", random_hole: float = 0.0, **changes) -> Config:

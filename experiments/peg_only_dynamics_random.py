@@ -1,0 +1,8 @@
+"""Type I, dynamics alone differ (paper, appendix): peg insertion; DDPG+HER with random numbers as v_h. Preset: fast."""
+
+from hcp_jax import presets
+from hcp_jax.config import Config
+
+
+def get_config() -> Config:
+    return presets.arm("peg_only_dynamics_random", "peg_insertion", "random", pool=presets.only_dynamics())
