@@ -8,8 +8,9 @@ from rich.table import Table
 from hcp_jax import command_line
 from hcp_jax.config import ConfigError
 from hcp_jax.evaluation.arm_sweeps import evaluate_arms
+from hcp_jax.evaluation.hopper_sweeps import evaluate_hoppers
+from hcp_jax.evaluation.new_robots import RangeChange
 from hcp_jax.evaluation.statistics import write_json
-from hcp_jax.evaluation.sweeps import evaluate_folder
 from hcp_jax.hardware.arm import TYPES
 from hcp_jax.physics.base import INTEGRATORS, PHYSICS
 from hcp_jax.training.run_folder import read_config
@@ -23,6 +24,15 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--physics", default="auto", choices=[*PHYSICS, *(f"native-{name}" for name in INTEGRATORS)])
     parser.add_argument("--fit-steps", type=int, help="control steps of each new robot for fitting its v_h (HCP-I); 0 skips it")
     parser.add_argument("--types", nargs="*", help="robot types to evaluate, A to K (the hopper has one: hopper)")
+    parser.add_argument(
+        "--range",
+        nargs=3,
+        action="append",
+        default=[],
+        metavar=("NAME", "LOW", "HIGH"),
+        help="draw the new robots' hardware from another range than in training: --range damping 30 40",
+    )
+    parser.add_argument("--pool", type=pathlib.Path, help="take the new robots from a folder that RobotPool.save wrote")
     parser.add_argument("--seed", type=int, default=0, help="seed of the initial states")
     parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
     parser.add_argument("--json", type=pathlib.Path, help="file to write the whole record to")
@@ -36,15 +46,26 @@ def main(arguments: list[str] | None = None) -> None:
         for name in options.types or ():
             if name not in known:
                 raise ConfigError(f"--types={name}: expected types out of {', '.join(known)}")
+        if options.pool and options.range:
+            raise ConfigError("--range: not with --pool, whose robots are drawn already")
         command_line.enable_compilation_cache()
         settings = {name: getattr(options, name) for name in ("trials", "robots_per_trial", "physics", "seed", "best")}
+        settings |= {"ranges": [read_range(*words) for words in options.range], "pool_folder": options.pool}
         if task == "hopper":
-            record = evaluate_folder(options.run, fit_steps=options.fit_steps, **settings)
+            record = evaluate_hoppers(options.run, fit_steps=options.fit_steps, **settings)
         else:
             record = evaluate_arms(options.run, types=options.types or (), **settings)
     print_table(record)
     if options.json:
         write_json(options.json, record)
+
+
+def read_range(name: str, low: str, high: str) -> RangeChange:
+    """The words of one `--range`."""
+    try:
+        return name, float(low), float(high)
+    except ValueError as error:
+        raise ConfigError(f"--range {name}={low} {high}: expected two numbers") from error
 
 
 def print_table(record: dict) -> None:

@@ -10,10 +10,20 @@ import numpy as np
 import pytest
 
 from hcp_jax import command_line
-from hcp_jax.config import Config, EmbeddingConfig, HopperConfig, PoolConfig, PPOConfig
+from hcp_jax.config import (
+    ArmConfig,
+    ArmPoolConfig,
+    Config,
+    DDPGConfig,
+    EmbeddingConfig,
+    HopperConfig,
+    PoolConfig,
+    PPOConfig,
+)
 from hcp_jax.hardware.hopper import make_hopper_pool
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.ranges import HopperRanges
+from hcp_jax.training import loop
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 command_line.enable_compilation_cache()
@@ -49,3 +59,27 @@ def rng() -> np.random.Generator:
 @pytest.fixture
 def key() -> jax.Array:
     return jax.random.key(0)
+
+
+@pytest.fixture(scope="session")
+def tiny_arms() -> Config:
+    """DDPG on 4 arms of two types, small enough to train in seconds."""
+    return Config(
+        name="arms",
+        task="reacher",
+        algorithm="ddpg",
+        encoding="chain_fk",
+        total_env_steps=320,
+        eval_every=80,
+        num_envs=4,
+        pool=ArmPoolConfig(types=("A", "I"), left_out=("H",), robots_per_type=2, heldout_per_type=2),
+        env=ArmConfig(episode_length=10),
+        ddpg=DDPGConfig(hidden_sizes=(8, 8), buffer_episodes=10, warmup_episodes=8, updates_per_iteration=5, batch_size=16),
+    )
+
+
+@pytest.fixture(scope="session")
+def finished_arms(tiny_arms, tmp_path_factory) -> pathlib.Path:
+    folder = tmp_path_factory.mktemp("runs") / "arms"
+    loop.train(tiny_arms, folder)
+    return folder

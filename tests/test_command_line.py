@@ -133,6 +133,24 @@ def tiny_experiment(folder: pathlib.Path, config: Config) -> str:
     )
 
 
+def test_evaluate_refuses_other_robots_that_cannot_be_drawn_or_read(finished_run, pool, tmp_path, capsys):
+    run = str(finished_run)
+    assert "--range dampin: no such field; did you mean damping" in fails(
+        capsys, evaluate.main, [run, "--range", "dampin", "1", "2"]
+    )
+    assert "low is above high" in fails(capsys, evaluate.main, [run, "--range", "damping", "2", "1"])
+    assert "expected two numbers" in fails(capsys, evaluate.main, [run, "--range", "damping", "a", "1"])
+    assert "not a robot pool" in fails(capsys, evaluate.main, [run, "--pool", str(tmp_path / "nowhere")])
+    pool.save(tmp_path / "pool")
+    assert "not with --pool" in fails(
+        capsys, evaluate.main, [run, "--pool", str(tmp_path / "pool"), "--range", "damping", "1", "2"]
+    )
+    pool.replace(template=pool.template + "<!-- -->").save(tmp_path / "other")
+    assert "another template" in fails(capsys, evaluate.main, [run, "--pool", str(tmp_path / "other")])
+    (tmp_path / "pool" / "pool.npz").write_bytes(b"")
+    assert "damaged" in fails(capsys, evaluate.main, [run, "--pool", str(tmp_path / "pool")])
+
+
 def test_a_run_never_overwrites_another(finished_run, tiny_config, tmp_path, capsys):
     before = (finished_run / "metrics.csv").read_bytes()
     path = tiny_experiment(tmp_path, tiny_config)

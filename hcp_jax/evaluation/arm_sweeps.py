@@ -8,6 +8,7 @@ import numpy as np
 
 from hcp_jax.config import ArmConfig, ArmPoolConfig, ConfigError
 from hcp_jax.envs.goal_episodes import GoalEpisodes
+from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, load_pool
 from hcp_jax.experiment.arm import make_arm_experiment, make_evaluator, make_heldout_arms
 from hcp_jax.hardware.arm import OTHER_ARMS, TYPES
 from hcp_jax.hardware.inverse_kinematics import is_reachable
@@ -27,9 +28,11 @@ def evaluate_arms(
     physics: str = "auto",
     seed: int = 0,
     best: bool = False,
+    ranges: Sequence[RangeChange] = (),
+    pool_folder: pathlib.Path | None = None,
 ) -> dict:
     """Evaluates the newest checkpoint of a run folder, or its best one, on held-out robots 0..trials*robots_per_trial-1 of each
-    type, one episode each.
+    type, one episode each; or on those of a saved pool, in order, all of a type before any twice.
 
     Args:
         folder: a run folder.
@@ -38,25 +41,33 @@ def evaluate_arms(
         physics: engine, may be `native-INTEGRATOR`.
         seed: seed of the episodes' goals, start poses and noise.
         best: take the checkpoint with the highest success on held-out robots of the training types.
+        ranges: ranges that the new robots are drawn from, where others than in training.
+        pool_folder: a saved pool to take the robots from.
 
     Returns:
         The record that `evaluate --json` writes (DESIGN.md, "The command line"); success in percent, distances in m.
 
     Raises:
-        RunFolderError, CheckpointError, ConfigError: the folder or a type cannot be evaluated.
+        RunFolderError, CheckpointError, ConfigError, PoolError: the folder, a type or the pool cannot be evaluated.
     """
     config = run_folder.read_config(folder)
     pools, env_config = config.pool, config.env
     assert isinstance(pools, ArmPoolConfig)
     assert isinstance(env_config, ArmConfig)
-    types = tuple(types) or tuple(dict.fromkeys((*pools.types, *pools.left_out)))
+    if not types and not pool_folder:
+        types = tuple(dict.fromkeys((*pools.types, *pools.left_out)))
     for name in types:
         if config.task == "reacher" and name in OTHER_ARMS:
             raise ConfigError(f"--types={name}: that arm holds a peg; it is of peg_insertion alone")
     physics = physics if physics != "auto" else config.physics
     run = make_arm_experiment(config, default_physics() if physics == "auto" else physics)
     iteration, state = load_state(folder, run, best)
-    upright = config.task == "peg_insertion"
+    count, upright = trials * robots_per_trial, config.task == "peg_insertion"
+    if pool_folder:
+        pools_by_type = split_types(load_pool(pool_folder, run.train_pool), types)
+    else:
+        drawn = change_ranges(config, ranges)
+        pools_by_type = {name: make_heldout_arms(drawn, (name,), count) for name in types}
     record = {
         "run": str(folder),
         "task": config.task,
@@ -68,18 +79,30 @@ def evaluate_arms(
         "commit": run_folder.read_commit(),
         "trials": trials,
         "robots_per_trial": robots_per_trial,
+        "ranges": {name: [low, high] for name, low, high in ranges},
+        "pool": str(pool_folder) if pool_folder else None,
         "types": {},
         "robots": [],
     }
-    for name in types:
-        pool = make_heldout_arms(config, (name,), trials * robots_per_trial)
+    for name, pool in pools_by_type.items():
         evaluator = make_evaluator(config, run.learner, run.make_env, pool, run.train_pool)
         key_play, key_goal = jax.random.split(jax.random.fold_in(jax.random.key(seed), TYPES.index(name)))
-        episodes = evaluator((state.params, state.statistics), np.arange(pool.num_robots), key_play)
-        reachable = is_reachable(pool, np.asarray(episodes.desired_goal), env_config.success_distance, key_goal, upright)
+        index = np.arange(count) % pool.num_robots
+        episodes = evaluator((state.params, state.statistics), index, key_play)
+        goals = np.asarray(episodes.desired_goal)
+        reachable = is_reachable(pool.subset(index), goals, env_config.success_distance, key_goal, upright)
         record["types"][name] = {"zero_shot": name not in pools.types} | summarise_type(episodes, reachable, trials)
         record["robots"] += [{"type": name} | row for row in robot_rows(pool, episodes, reachable)]
     return record
+
+
+def split_types(pool: RobotPool, types: Sequence[str]) -> dict[str, RobotPool]:
+    """The robots of each of `types` in a pool that contains them all, or of each type that it contains."""
+    names = np.asarray([TYPES[int(number)] for number in pool.hardware["type"][:, 0]])
+    for name in types:
+        if name not in names:
+            raise ConfigError(f"--types={name}: the pool has robots of type {', '.join(dict.fromkeys(names))}")
+    return {str(name): pool.subset(np.flatnonzero(names == name)) for name in types or dict.fromkeys(names)}
 
 
 def summarise_type(episodes: GoalEpisodes, reachable: np.ndarray, trials: int) -> dict:

@@ -7,8 +7,8 @@ import pytest
 from hcp_jax import collect, sweep
 from hcp_jax.config import to_dict
 from hcp_jax.evaluation.hopper_results import write_finetune
+from hcp_jax.evaluation.hopper_sweeps import evaluate_hoppers
 from hcp_jax.evaluation.summary import read_curve, steps_to_reach
-from hcp_jax.evaluation.sweeps import evaluate_folder
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import CheckpointError
 from hcp_jax.training.metrics import MetricsWriter
@@ -61,7 +61,7 @@ def test_collected_results_come_from_the_run_folders(swept, collected):
 
 
 def test_a_published_policy_earns_what_its_run_earns(swept, collected):
-    records = [evaluate_folder(folder / "with_s1", 1, 4) for folder in (swept / "runs", swept / "results" / "policies")]
+    records = [evaluate_hoppers(folder / "with_s1", 1, 4) for folder in (swept / "runs", swept / "results" / "policies")]
     assert records[0]["sets"] == records[1]["sets"]
     assert set(records[0]["sets"]) == {"train", "heldout", "heldout_fitted"}
 
@@ -72,11 +72,11 @@ def test_a_damaged_policy_and_one_of_another_architecture_are_refused(swept, col
     config = json.loads((folder / "config.json").read_text())
     (folder / "config.json").write_text(json.dumps(config | {"encoding": "none"}))
     with pytest.raises(CheckpointError, match=r"another architecture: .*policy/hidden_0/kernel is \(14, 8\)"):
-        evaluate_folder(folder, 1, 4)
+        evaluate_hoppers(folder, 1, 4)
     (folder / "config.json").write_text(json.dumps(config))
     (folder / "policy.msgpack").write_bytes((folder / "policy.msgpack").read_bytes()[:1000])
     with pytest.raises(CheckpointError, match=r"policy\.msgpack: damaged"):
-        evaluate_folder(folder, 1, 4)
+        evaluate_hoppers(folder, 1, 4)
 
 
 def test_collecting_nothing_is_an_error(tmp_path, capsys):

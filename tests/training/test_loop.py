@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from hcp_jax.algorithms.ppo import get_actor
-from hcp_jax.config import ArmConfig, ArmPoolConfig, Config, DDPGConfig
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training import loop
 from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
@@ -144,30 +143,6 @@ def test_a_warm_start_identifies_its_robots_under_the_old_actor_with_the_old_for
     jax.tree.map(np.testing.assert_array_equal, *models)
     np.testing.assert_array_equal(state.params["network"]["params"]["policy"]["hidden_1"]["kernel"], hidden)
     assert np.abs(np.asarray(state.params["embedding"]) - start).max() > 1e-3
-
-
-@pytest.fixture(scope="module")
-def tiny_arms() -> Config:
-    """DDPG on 4 arms of two types, small enough to train in seconds."""
-    return Config(
-        name="arms",
-        task="reacher",
-        algorithm="ddpg",
-        encoding="chain_fk",
-        total_env_steps=320,
-        eval_every=80,
-        num_envs=4,
-        pool=ArmPoolConfig(types=("A", "I"), left_out=("H",), robots_per_type=2, heldout_per_type=2),
-        env=ArmConfig(episode_length=10),
-        ddpg=DDPGConfig(hidden_sizes=(8, 8), buffer_episodes=10, warmup_episodes=8, updates_per_iteration=5, batch_size=16),
-    )
-
-
-@pytest.fixture(scope="module")
-def finished_arms(tiny_arms, tmp_path_factory) -> pathlib.Path:
-    folder = tmp_path_factory.mktemp("runs") / "arms"
-    loop.train(tiny_arms, folder)
-    return folder
 
 
 def test_an_arm_run_reports_success_of_training_types_and_of_the_type_left_out(finished_arms):

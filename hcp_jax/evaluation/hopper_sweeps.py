@@ -1,6 +1,7 @@
 """Evaluation of a run folder over many trials, on robots trained on and on new ones."""
 
 import pathlib
+from collections.abc import Sequence
 
 import jax
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from hcp_jax.algorithms.ppo import PPOState
 from hcp_jax.config import PoolConfig
 from hcp_jax.envs.episodes import Episodes, Evaluator
+from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, load_pool
 from hcp_jax.evaluation.statistics import robot_rows, summarise_trials
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.experiment.hopper import (
@@ -22,7 +24,7 @@ from hcp_jax.training import run_folder
 from hcp_jax.training.warm_start import load_state
 
 
-def evaluate_folder(
+def evaluate_hoppers(
     folder: pathlib.Path,
     trials: int,
     robots_per_trial: int,
@@ -30,12 +32,15 @@ def evaluate_folder(
     fit_steps: int | None = None,
     seed: int = 0,
     best: bool = False,
+    ranges: Sequence[RangeChange] = (),
+    pool_folder: pathlib.Path | None = None,
 ) -> dict:
     """Evaluates the newest checkpoint of a run folder, or its best one.
 
     Training robots are taken in order, all of them before any twice; new robots are held-out robots
-    0..trials*robots_per_trial-1, one episode each. Where v_h is learned, new robots get the mean embedding (`heldout`)
-    and, if `fit_steps` is above 0, a v_h fitted to their experience with the networks frozen (`heldout_fitted`).
+    0..trials*robots_per_trial-1, or those of a saved pool in order, one episode each. Where v_h is learned, new robots get
+    the mean embedding (`heldout`) and, if `fit_steps` is above 0, a v_h fitted to their experience with the networks frozen
+    (`heldout_fitted`).
 
     Args:
         folder: a run folder.
@@ -44,27 +49,30 @@ def evaluate_folder(
         fit_steps: control steps of each new robot for fitting; None takes the config's.
         seed: seed of the episodes' initial states.
         best: take the checkpoint with the highest return on training robots.
+        ranges: ranges that the new robots are drawn from, where others than in training.
+        pool_folder: a saved pool to take the new robots from.
 
     Returns:
         The record that `evaluate --json` writes (DESIGN.md, "The command line").
 
     Raises:
-        RunFolderError, CheckpointError: the folder cannot be evaluated.
+        RunFolderError, CheckpointError, ConfigError, PoolError: the folder or the pool cannot be evaluated.
     """
     config = run_folder.read_config(folder)
     run = make_experiment(config, physics)
     assert isinstance(run, HopperExperiment)
-    assert isinstance(config.pool, PoolConfig)
     iteration, state = load_state(folder, run, best)
     count = trials * robots_per_trial
-    heldout = make_heldout_pool(config.pool, count)
-    index = np.arange(count) % run.train_pool.num_robots
+    drawn = change_ranges(config, ranges).pool
+    assert isinstance(drawn, PoolConfig)
+    heldout = load_pool(pool_folder, run.train_pool) if pool_folder else make_heldout_pool(drawn, count)
+    index, new = (np.arange(count) % pool.num_robots for pool in (run.train_pool, heldout))
     sets = {"train": (run.train_pool, index, train_v_h(run, state.params)[index])}
-    sets["heldout"] = (heldout, np.arange(count), heldout_v_h(run, state.params, heldout))
+    sets["heldout"] = (heldout, new, heldout_v_h(run, state.params, heldout)[new])
     fit_steps = config.embedding.fit_steps if fit_steps is None else fit_steps
     if run.ppo.conditioning.is_learned and fit_steps:
-        print(f"fitting v_h of {count} new robots, {fit_steps:,} control steps of each, networks frozen", flush=True)
-        sets["heldout_fitted"] = (heldout, np.arange(count), EmbeddingFitter(run, heldout, fit_steps)(state))
+        print(f"fitting v_h of {heldout.num_robots} new robots, {fit_steps:,} control steps each, networks frozen", flush=True)
+        sets["heldout_fitted"] = (heldout, new, EmbeddingFitter(run, heldout, fit_steps)(state)[new])
     record = {
         "run": str(folder),
         "task": config.task,
@@ -76,6 +84,8 @@ def evaluate_folder(
         "commit": run_folder.read_commit(),
         "trials": trials,
         "robots_per_trial": robots_per_trial,
+        "ranges": {name: [low, high] for name, low, high in ranges},
+        "pool": str(pool_folder) if pool_folder else None,
         "types": {},
         "sets": {},
         "robots": [],

@@ -1,0 +1,28 @@
+"""Which robots a policy is evaluated on, beside those that its run would draw: of other ranges, or of a saved pool."""
+
+import pathlib
+from collections.abc import Sequence
+
+from hcp_jax.config import Config, ConfigError, from_dict, to_dict, unknown_field
+from hcp_jax.hardware.pool import RobotPool
+
+RangeChange = tuple[str, float, float]  # name, low, high
+
+
+def change_ranges(config: Config, changes: Sequence[RangeChange]) -> Config:
+    """`config` with other ranges of hardware. Raises ConfigError or RangeError."""
+    values = to_dict(config)
+    ranges = values["pool"]["ranges"]
+    for name, low, high in changes:
+        if name not in ranges:
+            raise ConfigError(unknown_field(f"--range {name}", sorted(ranges)))
+        ranges[name] = (low, high)
+    return from_dict(Config, values)
+
+
+def load_pool(folder: pathlib.Path, train_pool: RobotPool) -> RobotPool:
+    """A saved pool of the robots that a run is about. Raises PoolError if it cannot be read, ConfigError if it is of others."""
+    pool = RobotPool.load(folder)
+    if pool.template != train_pool.template:
+        raise ConfigError(f"--pool={folder}: robots of another template than the run's")
+    return pool
