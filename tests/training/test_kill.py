@@ -7,17 +7,24 @@ import subprocess
 import sys
 import time
 
+import jax
+import numpy as np
 import pytest
 
 from hcp_jax.config import to_dict
+from hcp_jax.experiment.build import make_experiment
+from hcp_jax.training.run_folder import read_config
+from hcp_jax.training.warm_start import load_state
 
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def experiment(tiny_config, tmp_path_factory) -> pathlib.Path:
+@pytest.fixture(scope="module", params=["hopper", "arms"])
+def experiment(request, tiny_config, tiny_arms, tmp_path_factory) -> pathlib.Path:
     """A run of about ten seconds after start-up, with 20 evaluations."""
-    config = dataclasses.replace(tiny_config, total_env_steps=64 * 2000, eval_every=64 * 100)
+    config = tiny_config if request.param == "hopper" else tiny_arms
+    batch = config.batch_size
+    config = dataclasses.replace(config, total_env_steps=2000 * batch, eval_every=100 * batch)
     path = tmp_path_factory.mktemp("experiment") / "experiment.py"
     path.write_text(
         f"from hcp_jax.config import Config, from_dict\ndef get_config():\n    return from_dict(Config, {to_dict(config)!r})\n"
@@ -29,7 +36,15 @@ def command(experiment: pathlib.Path, out: pathlib.Path, *arguments: str) -> lis
     return [sys.executable, "-m", "hcp_jax.train", "--config", str(experiment), "--out", str(out), *arguments]
 
 
-def test_a_run_killed_three_times_ends_with_the_same_metrics_bit_for_bit(experiment, tmp_path):
+def final_arrays(folder: pathlib.Path):
+    """The whole state, random keys as numbers."""
+    state = load_state(folder, make_experiment(read_config(folder)))[1]
+    return jax.tree.map(
+        lambda leaf: jax.random.key_data(leaf) if jax.dtypes.issubdtype(leaf.dtype, jax.dtypes.prng_key) else leaf, state
+    )
+
+
+def test_a_run_killed_three_times_ends_with_the_same_metrics_and_state_bit_for_bit(experiment, tmp_path):
     subprocess.run(command(experiment, tmp_path / "whole"), check=True, capture_output=True)
     out = tmp_path / "killed"
     moments = random.Random(0)
@@ -47,3 +62,4 @@ def test_a_run_killed_three_times_ends_with_the_same_metrics_bit_for_bit(experim
         process.wait()
     subprocess.run(command(experiment, out, "--resume"), check=True, capture_output=True)
     assert (out / "metrics.csv").read_bytes() == (tmp_path / "whole" / "metrics.csv").read_bytes()
+    jax.tree.map(np.testing.assert_array_equal, final_arrays(out), final_arrays(tmp_path / "whole"))
