@@ -39,9 +39,11 @@ def command(experiment: pathlib.Path, out: pathlib.Path, *arguments: str) -> lis
 def final_arrays(folder: pathlib.Path):
     """The whole state, random keys as numbers."""
     state = load_state(folder, make_experiment(read_config(folder)))[1]
-    return jax.tree.map(
-        lambda leaf: jax.random.key_data(leaf) if jax.dtypes.issubdtype(leaf.dtype, jax.dtypes.prng_key) else leaf, state
-    )
+    return jax.tree.map(lambda leaf: jax.random.key_data(leaf) if is_key(leaf) else leaf, state)
+
+
+def is_key(leaf) -> bool:
+    return isinstance(leaf, jax.Array) and jax.dtypes.issubdtype(leaf.dtype, jax.dtypes.prng_key)
 
 
 def test_a_run_killed_three_times_ends_with_the_same_metrics_and_state_bit_for_bit(experiment, tmp_path):
