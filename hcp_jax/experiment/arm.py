@@ -32,7 +32,7 @@ class ArmExperiment:
     train_pool: RobotPool
     heldout_pool: RobotPool
     learner: DDPG
-    make_env: Callable[[RobotPool], GoalEnv]
+    make_env: Callable[..., GoalEnv]
     num_iterations: int
     evaluator: GoalEvaluator
     best_metric: ClassVar[str] = "train_types_success"
@@ -103,10 +103,10 @@ def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:
     heldout_pool = make_heldout_arms(config, tuple(dict.fromkeys((*pools.types, *pools.left_out))), pools.heldout_per_type)
     task = ArmTask(config.task, **dataclasses.asdict(env_config))
 
-    def make_env(pool: RobotPool) -> GoalEnv:
-        integrator = physics.removeprefix("native-") if physics.startswith("native-") else env_config.integrator
+    def make_env(pool: RobotPool, engine: str = physics) -> GoalEnv:
+        integrator = engine.removeprefix("native-") if engine.startswith("native-") else env_config.integrator
         stepped = dataclasses.replace(task, integrator=integrator)
-        return GoalEnv(stepped, pool, make_physics(physics, pool, stepped.sim_dt, integrator))
+        return GoalEnv(stepped, pool, make_physics(engine, pool, stepped.sim_dt, integrator))
 
     learner = DDPG(
         make_env(train_pool),
@@ -137,7 +137,7 @@ def make_goal_conditioning(config: Config, pool: RobotPool, train_pool: RobotPoo
 
 
 def make_evaluator(
-    config: Config, learner: DDPG, make_env: Callable[[RobotPool], GoalEnv], pool: RobotPool, train_pool: RobotPool
+    config: Config, learner: DDPG, make_env: Callable[..., GoalEnv], pool: RobotPool, train_pool: RobotPool
 ) -> GoalEvaluator:
     """Plays robots that were not trained on. Where v_h is learned, theirs is unknown: the mean of the training robots'."""
     conditioning = make_goal_conditioning(config, pool, train_pool)

@@ -31,7 +31,7 @@ class HopperExperiment:
     train_pool: RobotPool
     heldout_pool: RobotPool
     ppo: PPO
-    make_env: Callable[[RobotPool], PoolEnv]
+    make_env: Callable[..., PoolEnv]
     evaluator: Evaluator
     num_iterations: int
     fitter: "EmbeddingFitter | None" = None
@@ -100,8 +100,8 @@ def make_hopper_experiment(config: Config, physics: str) -> HopperExperiment:
     heldout_pool = make_heldout_pool(pool_config, pool_config.num_heldout)
     task = Hopper(config.env.episode_length)
 
-    def make_env(pool: RobotPool) -> PoolEnv:
-        return PoolEnv(task, pool, make_physics(physics, pool, task.sim_dt, config.env.integrator))
+    def make_env(pool: RobotPool, engine: str = physics) -> PoolEnv:
+        return PoolEnv(task, pool, make_physics(engine, pool, task.sim_dt, config.env.integrator))
 
     num_iterations = -(-config.total_env_steps // config.batch_size)
     ppo = PPO(

@@ -1,0 +1,1 @@
+"""Measurements: what runs how fast, side by side in one run."""
