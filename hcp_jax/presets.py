@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from hcp_jax.config import ArmConfig, ArmPoolConfig, Config, DDPGConfig, EmbeddingConfig, HopperConfig, PPOConfig
+from hcp_jax.config import ArmConfig, ArmPoolConfig, Config, DDPGConfig, EmbeddingConfig, HopperConfig, PoolConfig, PPOConfig
 from hcp_jax.hardware.ranges import ArmRanges, nominal_lengths
 
 # Many environments, short unrolls: one environment per robot, 32 steps each. Rewards are scaled so that value targets are
@@ -35,6 +35,21 @@ PAPER_NUM_ENVS = 8
 def hopper(name: str, encoding: str, **changes) -> Config:
     """A hopper experiment with the `fast` preset. `changes` are fields of `Config`."""
     return dataclasses.replace(Config(name=name, encoding=encoding, ppo=FAST_PPO, env=FAST_HOPPER), **changes)
+
+
+def hopper_finetune(name: str, learning_rate: float, identify_steps: int, **changes) -> Config:
+    """HCP-I on 100 hoppers that no other experiment has. `changes` are fields of `Config`."""
+    config = hopper(
+        name,
+        "embedding",
+        total_env_steps=12_800_000,
+        eval_every=320_000,
+        num_envs=1000,
+        ppo=dataclasses.replace(FAST_PPO, learning_rate=learning_rate),
+        pool=PoolConfig(num_robots=100, split="new"),
+        embedding=dataclasses.replace(IDENTIFIED_EMBEDDING, identify_steps=identify_steps, fit_steps=0),
+    )
+    return dataclasses.replace(config, **changes)
 
 
 def hopper_paper(name: str, encoding: str, **changes) -> Config:

@@ -21,7 +21,7 @@ def collect(runs: pathlib.Path, results: pathlib.Path) -> list[str]:
     """Writes into `results` from the hopper's run folders under `runs`; returns a line for each thing written.
 
     `hopper/summary.json` (a row per algorithm), `hopper/curves.png`, each run's metrics under `hopper/runs/` and its policy
-    under `policies/`, `hopper/finetune.json` and `.png` if there are `hopper_finetune` runs, `hopper/embedding.json` and
+    under `policies/`, `hopper/finetune.json` and `.png` if there are runs of 100 new hoppers, `hopper/embedding.json` and
     `.png` if there is a `hopper_embedding` run.
     """
     out = results / "hopper"
@@ -33,14 +33,14 @@ def collect(runs: pathlib.Path, results: pathlib.Path) -> list[str]:
         copy_files(folder, out / "runs" / folder.name, (CONFIG_FILE, ENVIRONMENT_FILE, METRICS_FILE, TIMING_FILE))
         publish_policy(folder, results / "policies" / folder.name)
     written = [f"{results}/policies: {', '.join(folder.name for folder in folders)}"]
-    special = ("hopper_finetune", "hopper_embedding")
-    main = {name: group for name, group in by_name.items() if name not in special}
+    new_robots = [folder for folder in folders if read_config(folder).pool.split == "new"]
+    main = {name: group for name, group in by_name.items() if name != "hopper_embedding" and group[0] not in new_robots}
     if main:
         write_json(out / "summary.json", summarise_runs([folder for group in main.values() for folder in group]))
         plot_groups(main, out / "curves.png", ("train_return_mean", "heldout_return_mean"))
         written.append(f"{out}/summary.json, {out}/curves.png: {', '.join(main)}")
-    if "hopper_finetune" in by_name:
-        written.append(write_finetune(by_name["hopper_finetune"], out))
+    if new_robots:
+        written.append(write_finetune(new_robots, out))
     if "hopper_embedding" in by_name:
         written.append(write_embedding(by_name["hopper_embedding"][0], out))
     return written
