@@ -1,80 +1,42 @@
 """What is published of the hopper: tables, curves and pictures from run folders."""
 
 import pathlib
-import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from hcp_jax.evaluation.embedding import knn_r2, plot_embedding
+from hcp_jax.evaluation.publishing import group_by_name, plot_groups, publish_runs
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.summary import read_curve, read_run_commit, steps_to_reach, summarise_runs
 from hcp_jax.experiment.build import make_experiment
-from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE
-from hcp_jax.training.policy_file import write_policy
-from hcp_jax.training.run_folder import CONFIG_FILE, ENVIRONMENT_FILE, read_config
+from hcp_jax.training.run_folder import read_config
 from hcp_jax.training.warm_start import load_state
 
+LABEL = "return of one episode"
 
-def collect(runs: pathlib.Path, results: pathlib.Path) -> list[str]:
-    """Writes into `results` from the hopper's run folders under `runs`; returns a line for each thing written.
+
+def collect_hoppers(folders: Sequence[pathlib.Path], results: pathlib.Path) -> list[str]:
+    """Writes into `results` from the hopper's run folders; returns a line for each thing written.
 
     `hopper/summary.json` (a row per algorithm), `hopper/curves.png`, each run's metrics under `hopper/runs/` and its policy
     under `policies/`, `hopper/finetune.json` and `.png` if there are runs of 100 new hoppers, `hopper/embedding.json` and
     `.png` if there is a `hopper_embedding` run.
     """
     out = results / "hopper"
-    folders = sorted(path.parent for path in runs.glob(f"*/{CONFIG_FILE}") if (path.parent / METRICS_FILE).exists())
-    folders = [folder for folder in folders if read_config(folder).task == "hopper"]
-    by_name: dict[str, list[pathlib.Path]] = {}
-    for folder in folders:
-        by_name.setdefault(read_config(folder).name, []).append(folder)
-        copy_files(folder, out / "runs" / folder.name, (CONFIG_FILE, ENVIRONMENT_FILE, METRICS_FILE, TIMING_FILE))
-        publish_policy(folder, results / "policies" / folder.name)
-    written = [f"{results}/policies: {', '.join(folder.name for folder in folders)}"]
+    written = [publish_runs(folders, out, results / "policies")]
+    by_name = group_by_name(folders)
     new_robots = [folder for folder in folders if read_config(folder).pool.split == "new"]
     main = {name: group for name, group in by_name.items() if name != "hopper_embedding" and group[0] not in new_robots}
     if main:
         write_json(out / "summary.json", summarise_runs([folder for group in main.values() for folder in group]))
-        plot_groups(main, out / "curves.png", ("train_return_mean", "heldout_return_mean"))
+        plot_groups(main, out / "curves.png", ("train_return_mean", "heldout_return_mean"), LABEL)
         written.append(f"{out}/summary.json, {out}/curves.png: {', '.join(main)}")
     if new_robots:
         written.append(write_finetune(new_robots, out))
     if "hopper_embedding" in by_name:
         written.append(write_embedding(by_name["hopper_embedding"][0], out))
     return written
-
-
-def copy_files(source: pathlib.Path, target: pathlib.Path, names: Sequence[str]) -> None:
-    target.mkdir(parents=True, exist_ok=True)
-    for name in names:
-        shutil.copy(source / name, target / name)
-
-
-def publish_policy(folder: pathlib.Path, target: pathlib.Path) -> None:
-    """Writes the newest policy of a run, with its config and environment, to `target`."""
-    copy_files(folder, target, (CONFIG_FILE, ENVIRONMENT_FILE))
-    write_policy(target, load_state(folder, make_experiment(read_config(folder)))[1])
-
-
-def plot_groups(groups: Mapping[str, Sequence[pathlib.Path]], path: pathlib.Path, columns: Sequence[str]) -> None:
-    """Mean over seeds of each group's curve, with the range over seeds shaded; one panel per column."""
-    figure = Figure((6 * len(columns), 4.5), layout="constrained")
-    panels = figure.subplots(1, len(columns), sharey=True, squeeze=False)[0]
-    for column, axes in zip(columns, panels, strict=True):
-        for name, folders in groups.items():
-            curves = [read_curve(folder, column) for folder in folders]
-            length = min(len(curve) for curve in curves)
-            steps, values = curves[0][:length, 0] / 1e6, np.stack([curve[:length, 1] for curve in curves])
-            axes.plot(steps, values.mean(axis=0), label=f"{name} ({len(folders)} seeds)")
-            axes.fill_between(steps, values.min(axis=0), values.max(axis=0), alpha=0.2)
-        axes.set_title(column.replace("_", " "))
-        axes.set_xlabel("control steps [million]")
-        axes.grid(alpha=0.3)
-    panels[0].set_ylabel("return of one episode")
-    panels[0].legend(frameon=False)
-    figure.savefig(path, dpi=120)
 
 
 def write_finetune(folders: Sequence[pathlib.Path], out: pathlib.Path) -> str:
@@ -102,7 +64,7 @@ def write_finetune(folders: Sequence[pathlib.Path], out: pathlib.Path) -> str:
             }
         )
     write_json(out / "finetune.json", rows)
-    plot_groups(groups, out / "finetune.png", ("train_return_mean",))
+    plot_groups(groups, out / "finetune.png", ("train_return_mean",), LABEL)
     return f"{out}/finetune.json, {out}/finetune.png: {rows}"
 
 

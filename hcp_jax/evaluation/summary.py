@@ -76,7 +76,8 @@ def read_run_commit(folder: pathlib.Path) -> str:
 def read_curve(folder: pathlib.Path, column: str) -> np.ndarray:
     """Control steps and `column` of each evaluation of a run: [E, 2]."""
     rows = read_rows(folder / METRICS_FILE)
-    return np.asarray([(int(row["env_steps"]), float(row[column])) for row in rows if row.get(column)])
+    points = [(int(row["env_steps"]), float(row[column])) for row in rows if row.get(column)]
+    return np.asarray(points).reshape(-1, 2)
 
 
 def steps_to_reach(folder: pathlib.Path, column: str, value: float) -> int | None:

@@ -83,7 +83,7 @@ def test_collecting_nothing_is_an_error(tmp_path, capsys):
     with pytest.raises(SystemExit) as exit_info:
         collect.main([str(tmp_path), "--out", str(tmp_path / "results")])
     assert exit_info.value.code == 2
-    assert "holds no run folders" in capsys.readouterr().err
+    assert "holds no run folders with results" in capsys.readouterr().err
 
 
 def test_steps_to_reach_is_the_first_evaluation_at_or_above_the_value(tmp_path):

@@ -1,0 +1,29 @@
+import json
+import shutil
+
+import pytest
+
+from hcp_jax import collect
+from hcp_jax.evaluation.arm_sweeps import evaluate_arms
+from hcp_jax.training.metrics import read_rows
+
+
+@pytest.fixture(scope="module")
+def results(finished_arms, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("collect")
+    shutil.copytree(finished_arms, folder / "runs" / "arms_s0")
+    collect.main([str(folder / "runs"), "--out", str(folder / "results")])
+    return folder / "results"
+
+
+def test_collected_successes_come_from_the_run_folder(results, finished_arms):
+    last = read_rows(finished_arms / "metrics.csv")[-1]
+    (row,) = json.loads((results / "arms" / "summary.json").read_text())
+    assert (row["algorithm"], row["seeds"], row["env_steps"]) == ("HCP-E", [0], 320)
+    assert row["left_out_success_mean"] == round(float(last["left_out_success"]), 1)
+    assert (results / "arms" / "reacher.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_published_arm_policy_moves_as_its_run_does(results, finished_arms):
+    records = [evaluate_arms(folder, 1, 2, types=("H",)) for folder in (finished_arms, results / "policies" / "arms_s0")]
+    assert records[0]["robots"] == records[1]["robots"]
