@@ -62,6 +62,13 @@ def key() -> jax.Array:
 
 
 @pytest.fixture(scope="session")
+def finished_run(tiny_config, tmp_path_factory) -> pathlib.Path:
+    folder = tmp_path_factory.mktemp("runs") / "tiny"
+    loop.train(tiny_config, folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
 def tiny_arms() -> Config:
     """DDPG on 4 arms of two types, small enough to train in seconds."""
     return Config(

@@ -9,7 +9,6 @@ import pytest
 
 from hcp_jax import command_line, evaluate, train
 from hcp_jax.config import Config, ConfigError, field_names, from_dict, to_dict
-from hcp_jax.training import loop
 
 EXPERIMENTS = pathlib.Path(__file__).resolve().parents[1] / "experiments"
 HOPPER = str(EXPERIMENTS / "hopper_ppo.py")
@@ -117,13 +116,6 @@ def test_a_config_file_that_fails_says_how(body, expected, tmp_path, capsys):
     path = experiment(tmp_path, body)
     assert expected in fails(capsys, train.main, ["--config", path, "--out", str(tmp_path / "run")])
     assert not (tmp_path / "run").exists()
-
-
-@pytest.fixture(scope="module")
-def finished_run(tiny_config, tmp_path_factory) -> pathlib.Path:
-    folder = tmp_path_factory.mktemp("runs") / "tiny"
-    loop.train(tiny_config, folder)
-    return folder
 
 
 def tiny_experiment(folder: pathlib.Path, config: Config) -> str:

@@ -17,44 +17,37 @@ from hcp_jax.training.loop import Interrupt, TrainingLoop
 from hcp_jax.training.warm_start import load_init, load_state
 
 
-@pytest.fixture(scope="module")
-def finished(tiny_config, tmp_path_factory) -> pathlib.Path:
-    folder = tmp_path_factory.mktemp("runs") / "tiny"
-    loop.train(tiny_config, folder)
-    return folder
-
-
 def metrics(folder: pathlib.Path) -> list[dict]:
     with (folder / "metrics.csv").open() as file:
         return list(csv.DictReader(file))
 
 
-def test_a_run_folder_holds_what_the_design_promises(finished):
-    names = {path.name for path in finished.iterdir()}
+def test_a_run_folder_holds_what_the_design_promises(finished_run):
+    names = {path.name for path in finished_run.iterdir()}
     assert {"config.json", "environment.json", "metrics.csv", "timing.csv", "checkpoints", "events", "curves.png"} <= names
-    environment = json.loads((finished / "environment.json").read_text())
+    environment = json.loads((finished_run / "environment.json").read_text())
     assert environment["physics"] == "native"
     assert environment["versions"]["jax"] == jax.__version__
-    assert (finished / "curves.png").read_bytes().startswith(b"\x89PNG")
+    assert (finished_run / "curves.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_there_is_one_row_per_evaluation_with_both_kinds_of_held_out_v_h(finished):
-    rows = metrics(finished)
+def test_there_is_one_row_per_evaluation_with_both_kinds_of_held_out_v_h(finished_run):
+    rows = metrics(finished_run)
     assert [int(row["env_steps"]) for row in rows] == [128, 256, 384, 512]
     same = [float(row["heldout_fitted_return_mean"]) == float(row["heldout_return_mean"]) for row in rows]
     assert same == [True, False, False, False], "the policy sees v_h from 192 steps on"
 
 
-def test_the_newest_checkpoints_and_the_best_are_kept(finished, tiny_config):
-    rows = metrics(finished)
+def test_the_newest_checkpoints_and_the_best_are_kept(finished_run, tiny_config):
+    rows = metrics(finished_run)
     best = 2 * (1 + int(np.argmax([float(row["train_return_mean"]) for row in rows])))
-    checkpoints = Checkpoints(finished / "checkpoints", read_only=True)
+    checkpoints = Checkpoints(finished_run / "checkpoints", read_only=True)
     assert checkpoints.iterations() == [4, 6, 8]
     assert checkpoints.best() == best
 
 
 @pytest.mark.parametrize("cut", [2, 3, 5])
-def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished, tiny_config, tmp_path, cut):
+def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished_run, tiny_config, tmp_path, cut):
     """Cut after `cut` of 8 iterations: between two evaluations and at one."""
     folder = tmp_path / "run"
     run = make_experiment(tiny_config)
@@ -72,29 +65,29 @@ def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished, t
     run.ppo.train = train_and_interrupt
     assert training.run(run.init_state(), interrupt) is None
     loop.train(tiny_config, folder, resume=True)
-    assert (folder / "metrics.csv").read_bytes() == (finished / "metrics.csv").read_bytes()
+    assert (folder / "metrics.csv").read_bytes() == (finished_run / "metrics.csv").read_bytes()
 
 
-def test_rows_written_after_the_last_checkpoint_are_dropped_on_resume(finished, tiny_config, tmp_path):
-    folder = shutil.copytree(finished, tmp_path / "run")
+def test_rows_written_after_the_last_checkpoint_are_dropped_on_resume(finished_run, tiny_config, tmp_path):
+    folder = shutil.copytree(finished_run, tmp_path / "run")
     shutil.rmtree(folder / "checkpoints" / "newest" / "8")
     loop.train(tiny_config, folder, resume=True)
-    assert (folder / "metrics.csv").read_bytes() == (finished / "metrics.csv").read_bytes()
+    assert (folder / "metrics.csv").read_bytes() == (finished_run / "metrics.csv").read_bytes()
 
 
 @pytest.mark.parametrize("damage", ["truncated", "emptied"])
-def test_a_damaged_checkpoint_is_passed_over_with_a_line(finished, tiny_config, tmp_path, capsys, damage):
-    folder = shutil.copytree(finished, tmp_path / "run")
+def test_a_damaged_checkpoint_is_passed_over_with_a_line(finished_run, tiny_config, tmp_path, capsys, damage):
+    folder = shutil.copytree(finished_run, tmp_path / "run")
     for path in (folder / "checkpoints" / "newest" / "8").rglob("*"):
         if path.is_file():
             path.write_bytes(path.read_bytes()[: path.stat().st_size // 2] if damage == "truncated" else b"")
     loop.train(tiny_config, folder, resume=True)
     assert "checkpoint 8 cannot be read and is passed over" in capsys.readouterr().out
-    assert (folder / "metrics.csv").read_bytes() == (finished / "metrics.csv").read_bytes()
+    assert (folder / "metrics.csv").read_bytes() == (finished_run / "metrics.csv").read_bytes()
 
 
-def test_a_longer_run_may_continue_a_shorter_one(finished, tiny_config, tmp_path):
-    folder = shutil.copytree(finished, tmp_path / "run")
+def test_a_longer_run_may_continue_a_shorter_one(finished_run, tiny_config, tmp_path):
+    folder = shutil.copytree(finished_run, tmp_path / "run")
     loop.train(dataclasses.replace(tiny_config, total_env_steps=640), folder, resume=True)
     assert [int(row["env_steps"]) for row in metrics(folder)] == [128, 256, 384, 512, 640]
 
@@ -106,11 +99,11 @@ def test_heldout_robots_do_not_depend_on_the_training_seed(tiny_config):
 
 
 @pytest.fixture(scope="module")
-def warm(finished, tiny_config):
+def warm(finished_run, tiny_config):
     """A warm-started experiment on new robots, its state at the start, and the state that it starts from."""
-    config = dataclasses.replace(tiny_config, init=str(finished), pool=dataclasses.replace(tiny_config.pool, split="new"))
+    config = dataclasses.replace(tiny_config, init=str(finished_run), pool=dataclasses.replace(tiny_config.pool, split="new"))
     run = make_experiment(config)
-    return run, load_init(config)(run, run.init_state()), load_state(finished, make_experiment(tiny_config))[1]
+    return run, load_init(config)(run, run.init_state()), load_state(finished_run, make_experiment(tiny_config))[1]
 
 
 def test_a_warm_start_takes_hidden_layers_and_leaves_output_layers_and_embeddings_new(warm):
@@ -125,10 +118,10 @@ def test_a_warm_start_takes_hidden_layers_and_leaves_output_layers_and_embedding
     )
 
 
-def test_a_warm_start_of_all_layers_takes_the_output_layers_too(finished, tiny_config):
-    config = dataclasses.replace(tiny_config, init=str(finished), init_layers="all")
+def test_a_warm_start_of_all_layers_takes_the_output_layers_too(finished_run, tiny_config):
+    config = dataclasses.replace(tiny_config, init=str(finished_run), init_layers="all")
     run = make_experiment(config)
-    state, source = load_init(config)(run, run.init_state()), load_state(finished, make_experiment(tiny_config))[1]
+    state, source = load_init(config)(run, run.init_state()), load_state(finished_run, make_experiment(tiny_config))[1]
     trained = get_actor(source.params, source.obs_statistics).network
     jax.tree.map(np.testing.assert_array_equal, state.reserve.network, trained)
 
