@@ -43,6 +43,8 @@ def write_finetune(folders: Sequence[pathlib.Path], out: pathlib.Path) -> str:
     """Steps at which runs from a pretrained one reach the final return of the run from scratch of the same seed."""
     configs = {folder: read_config(folder) for folder in folders}
     scratch = {config.seed: folder for folder, config in configs.items() if not config.init}
+    if not scratch:
+        return "no run from scratch to compare fine-tuning with"
     groups: dict[str, list[pathlib.Path]] = {"from scratch": list(scratch.values())}
     rows = []
     for folder, config in configs.items():

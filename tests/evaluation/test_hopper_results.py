@@ -113,3 +113,4 @@ def test_fine_tuning_reports_when_each_warm_start_reaches_what_scratch_ends_with
     steps = {row["init_layers"]: row["pretrained_steps_to_scratch_final"] for row in rows}
     assert steps == {"hidden": 300, "all": 100}
     assert {row["scratch_final_return"] for row in rows} == {90.0}
+    assert "no run from scratch" in write_finetune([tmp_path / "hidden"], tmp_path)
