@@ -54,7 +54,7 @@ def _summarise_group(name: str, env_steps: int, runs: list[tuple[Config, pathlib
         values = [float(last[column]) for _, _, last in runs if last.get(column)]
         row[f"{key}_mean"] = round(float(np.mean(values)), 1) if values else None
         row[f"{key}_std"] = round(float(np.std(values)), 1) if values else None
-    seconds = [float(read_rows(folder / TIMING_FILE)[-1]["seconds"]) for _, folder, _ in runs]
+    seconds = [read_wall_seconds(folder) for _, folder, _ in runs]
     row["wall_seconds"] = round(float(np.mean(seconds)), 1)
     row["commit"] = sorted({read_run_commit(folder) for _, folder, _ in runs})
     return row
@@ -66,6 +66,12 @@ def name_algorithm(config: Config) -> str:
     if encoding == "none":
         return baseline
     return ALGORITHM_NAMES.get(encoding, f"{baseline}+{encoding.removeprefix('none+')}")
+
+
+def read_wall_seconds(folder: pathlib.Path) -> float:
+    """Time from start to the last evaluation, summed over the processes that a resumed run had (each counts from 0)."""
+    seconds = [float(row["seconds"]) for row in read_rows(folder / TIMING_FILE)]
+    return sum(now for now, after in zip(seconds, [*seconds[1:], 0.0], strict=True) if after < now)
 
 
 def read_run_commit(folder: pathlib.Path) -> str:

@@ -8,7 +8,7 @@ from hcp_jax import collect, sweep
 from hcp_jax.config import to_dict
 from hcp_jax.evaluation.hopper_results import write_finetune
 from hcp_jax.evaluation.hopper_sweeps import evaluate_hoppers
-from hcp_jax.evaluation.summary import read_curve, steps_to_reach
+from hcp_jax.evaluation.summary import read_curve, read_wall_seconds, steps_to_reach
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import CheckpointError
 from hcp_jax.training.metrics import MetricsWriter
@@ -94,6 +94,14 @@ def test_steps_to_reach_is_the_first_evaluation_at_or_above_the_value(tmp_path):
     assert read_curve(tmp_path, "r").tolist() == [[10, 1], [20, 5], [30, 3], [40, 6]]
     assert steps_to_reach(tmp_path, "r", 4.0) == 20
     assert steps_to_reach(tmp_path, "r", 7.0) is None
+
+
+def test_wall_time_adds_up_the_processes_of_a_resumed_run(tmp_path):
+    writer = MetricsWriter(tmp_path)
+    for steps, seconds in ((10, 5.0), (20, 9.0), (30, 2.0), (40, 4.5)):
+        writer.write({"env_steps": steps}, {"env_steps": steps, "seconds": seconds})
+    writer.close()
+    assert read_wall_seconds(tmp_path) == 9.0 + 4.5
 
 
 def test_fine_tuning_reports_when_each_warm_start_reaches_what_scratch_ends_with(tiny_config, tmp_path):
