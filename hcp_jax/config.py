@@ -126,6 +126,8 @@ class ArmConfig:
     Attributes:
         integrator: `rk4` (1 ms, released code), `euler` (1 ms) or `implicitfast` (4 ms).
         random_hole: side of the cube [m] in which the hole is placed (paper: 0.2); 0 keeps it where it is.
+        goal_lift: half of the training goals of peg insertion lie up to so far [m] above the hole's target; evaluation has the
+            target alone.
         episode_length: control steps per episode (paper: 200).
         observation_noise: half-width of the uniform noise on joint angles [rad] and velocities [rad/s].
         success_distance: of the point of interest from the goal [m].
@@ -134,6 +136,7 @@ class ArmConfig:
 
     integrator: str = "implicitfast"
     random_hole: float = 0.0
+    goal_lift: float = 0.0
     episode_length: int = 200
     observation_noise: float = 0.02
     success_distance: float = 0.02
@@ -143,7 +146,7 @@ class ArmConfig:
         _require(self.integrator in INTEGRATORS, "env.integrator", self.integrator, f"one of {', '.join(INTEGRATORS)}")
         _require(self.episode_length >= 1, "env.episode_length", self.episode_length, "at least 1")
         _require(_positive(self.success_distance), "env.success_distance", self.success_distance, "a number above 0")
-        for name in ("random_hole", "observation_noise", "action_cost"):
+        for name in ("random_hole", "goal_lift", "observation_noise", "action_cost"):
             _require(_at_least_zero(getattr(self, name)), f"env.{name}", getattr(self, name), "a number of at least 0")
 
 

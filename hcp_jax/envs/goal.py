@@ -62,8 +62,7 @@ class GoalTask(Protocol):
     def episode_length(self) -> int: ...
     @property
     def observation_noise(self) -> float: ...
-    def sample_goal(self, key: jax.Array, num_envs: int) -> jax.Array: ...
-    def table_position(self, goal: jax.Array) -> jax.Array | None: ...
+    def sample_goal(self, key: jax.Array, num_envs: int) -> tuple[jax.Array, jax.Array | None]: ...
     def compute_reward(
         self, achieved_goal: jax.Array, desired_goal: jax.Array, action: jax.Array
     ) -> tuple[jax.Array, jax.Array]: ...
@@ -86,13 +85,13 @@ class GoalEnv:
         key, key_pose, key_goal, key_noise = jax.random.split(key, 4)
         num_envs = index.shape[0]
         pose = jax.random.randint(key_pose, (num_envs,), 0, self._start_angles.shape[1])
-        desired_goal = self.task.sample_goal(key_goal, num_envs)
+        desired_goal, table_position = self.task.sample_goal(key_goal, num_envs)
         qpos = self._start_angles[index, pose]
         physics = PhysicsState(
             qpos=qpos,
             qvel=jnp.zeros_like(qpos),
             qacc_warmstart=jnp.zeros_like(qpos),
-            mocap_pos=self.task.table_position(desired_goal),
+            mocap_pos=table_position,
         )
         return GoalState(
             physics=physics,

@@ -103,13 +103,13 @@ def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:
     heldout_pool = make_heldout_arms(config, tuple(dict.fromkeys((*pools.types, *pools.left_out))), pools.heldout_per_type)
     task = ArmTask(config.task, **dataclasses.asdict(env_config))
 
-    def make_env(pool: RobotPool, engine: str = physics) -> GoalEnv:
+    def make_env(pool: RobotPool, engine: str = physics, goal_lift: float = 0.0) -> GoalEnv:
         integrator = engine.removeprefix("native-") if engine.startswith("native-") else env_config.integrator
-        stepped = dataclasses.replace(task, integrator=integrator)
+        stepped = dataclasses.replace(task, integrator=integrator, goal_lift=goal_lift)
         return GoalEnv(stepped, pool, make_physics(engine, pool, stepped.sim_dt, integrator))
 
     learner = DDPG(
-        make_env(train_pool),
+        make_env(train_pool, goal_lift=env_config.goal_lift),
         make_goal_conditioning(config, train_pool, train_pool),
         config.ddpg,
         config.resolved_num_envs,

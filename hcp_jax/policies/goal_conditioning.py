@@ -3,7 +3,7 @@
 | encoding | length beyond observation (14) and goal (3) | content |
 |---|---|---|
 | those of `hcp_jax.hardware.arm_encodings` | as there | a constant of the robot |
-| `chain_fk` | 48 + 54 | `chain`, and what it says at the observed joint angles: positions and axes of the joints, position and rotation of the end effector in the world (what the released code feeds) |
+| `chain_fk` | 48 + 57 | `chain`, and what it says at the observed joint angles: positions and axes of the joints, position and rotation of the end effector in the world (what the released code feeds), and end effector minus goal |
 | `embedding` | its size | learned with the policy (HCP-I) |
 | `none+end_effector` | 3 | no v_h, but the end effector's position: a control |
 | `none+goal_offset` | 3 | no v_h, but end effector minus goal: a control |
@@ -17,7 +17,7 @@ from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.policies.conditioning import Embedding
 
-POSE_FEATURES = {"chain_fk": 54, "none+end_effector": 3, "none+goal_offset": 3}
+POSE_FEATURES = {"chain_fk": 57, "none+end_effector": 3, "none+goal_offset": 3}
 GOAL_CONDITIONINGS = (*ARM_ENCODINGS, *POSE_FEATURES, "embedding")
 NUM_JOINTS = 7
 
@@ -71,4 +71,4 @@ class GoalConditioning:
         mask = self._joint_mask[index][..., None]
         flat = (*angles.shape[:-1], -1)
         joints = [positions[..., :-1, :] * mask, rotations[..., :-1, :, 2] * mask]
-        return [part.reshape(flat) for part in (*joints, end_effector, rotations[..., -1, :, :])]
+        return [part.reshape(flat) for part in (*joints, end_effector, rotations[..., -1, :, :], end_effector - goal)]

@@ -92,6 +92,6 @@ class Critic(nn.Module):
 
 
 def selu_layer(x: jax.Array, size: int, name: str, layer_norm: bool) -> jax.Array:
-    """A dense layer with SELU, and LayerNorm before it if asked. Call inside a compact module."""
+    """A dense layer with SELU, and LayerNorm without scale and bias before it if asked. Call inside a compact module."""
     x = nn.Dense(size, name=name)(x)
-    return nn.selu(nn.LayerNorm(name=f"{name}_norm")(x) if layer_norm else x)
+    return nn.selu(nn.LayerNorm(use_scale=False, use_bias=False, name=f"{name}_norm")(x) if layer_norm else x)

@@ -39,13 +39,22 @@ def test_a_reward_is_1_within_2_cm_and_minus_1_elsewhere_less_the_action():
 
 
 def test_goals_fill_the_papers_boxes(key):
-    goals = ArmTask("reacher").sample_goal(key, 2000)
+    goals, _ = ArmTask("reacher").sample_goal(key, 2000)
     np.testing.assert_allclose(goals.min(0), REACHER_GOALS[0], atol=0.01)
     np.testing.assert_allclose(goals.max(0), REACHER_GOALS[1], atol=0.01)
     assert abs(np.corrcoef(np.asarray(goals).T)[0, 1]) < 0.1, "not the box's diagonal"
-    np.testing.assert_allclose(ArmTask("peg_insertion").sample_goal(key, 3), np.tile(HOLE, (3, 1)), rtol=1e-6)
-    holes = ArmTask("peg_insertion", random_hole=0.2).sample_goal(key, 2000)
+    np.testing.assert_allclose(ArmTask("peg_insertion").sample_goal(key, 3)[0], np.tile(HOLE, (3, 1)), rtol=1e-6)
+    holes, _ = ArmTask("peg_insertion", random_hole=0.2).sample_goal(key, 2000)
     np.testing.assert_allclose(holes.max(0) - holes.min(0), 0.2, atol=0.01)
+
+
+def test_half_of_the_lifted_goals_lie_above_the_hole_whose_table_stays(key):
+    goals, table = ArmTask("peg_insertion", goal_lift=0.2).sample_goal(key, 2000)
+    lift = np.asarray(goals)[:, 2] - HOLE[2]
+    assert lift.min() == 0.0
+    assert 0.19 < lift.max() <= 0.2
+    assert 0.45 < (lift > 0).mean() < 0.55
+    np.testing.assert_allclose(table, ArmTask("peg_insertion").sample_goal(key, 2000)[1], atol=1e-6)
 
 
 def test_the_table_stands_around_the_goal(key):

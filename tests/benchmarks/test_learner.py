@@ -1,0 +1,33 @@
+import json
+
+import pytest
+
+from hcp_jax import benchmark
+
+
+@pytest.mark.parametrize(
+    ("experiment", "rows"),
+    [
+        (
+            "presets.arm('a', 'reacher', 'chain_fk', num_envs=4, pool=ArmPoolConfig(('I',), (), 2))",
+            ["iteration", "collect", "update"],
+        ),
+        ("presets.hopper('a', 'kinematics', pool=PoolConfig(num_robots=4))", ["iteration"]),
+    ],
+)
+def test_an_iteration_and_its_parts_are_timed(experiment, rows, tmp_path):
+    (tmp_path / "experiment.py").write_text(
+        "from hcp_jax import presets\nfrom hcp_jax.config import ArmPoolConfig, PoolConfig\n"
+        f"def get_config():\n    return {experiment}\n"
+    )
+    arguments = ["--config", str(tmp_path / "experiment.py"), "--seconds", "0.01", "--json", str(tmp_path / "out.json")]
+    sizes = ["--config.ddpg.updates_per_iteration=20", "--config.env.episode_length=10", "--config.ddpg.buffer_episodes=8"]
+    benchmark.main(["learner", *arguments, *(sizes if len(rows) > 1 else ())])
+    timed = {row["name"]: row for row in json.loads((tmp_path / "out.json").read_text())["rows"]}
+    assert list(timed) == rows
+    assert all(row["seconds"] > 0 for row in timed.values())
+    if len(rows) > 1:
+        assert timed["collect"]["seconds"] + 19 * timed["update"]["seconds"] == pytest.approx(
+            timed["iteration"]["seconds"], rel=0.1
+        )
+        assert timed["update"]["replay_bytes"] == 8 * 4 * (11 * (14 + 3) + 10 * 7 + 3 + 1 + 1)
