@@ -216,6 +216,7 @@ class DDPGConfig:
         preset: name of the set of values that this one started from.
         hidden_sizes: widths of the hidden layers of actor and critic; the action enters the critic at the second.
         actor_learning_rate, critic_learning_rate: Adam's steps.
+        learning_rate_decay: of all steps: their factor at the end of the run, reached linearly.
         critic_weight_decay: L2 penalty on the critic's kernels.
         gamma: discount per control step.
         tau: step of the target networks towards the networks, per update.
@@ -236,6 +237,7 @@ class DDPGConfig:
     hidden_sizes: tuple[int, ...] = (128, 256, 256)
     actor_learning_rate: float = 1e-4
     critic_learning_rate: float = 1e-4
+    learning_rate_decay: float = 1.0
     critic_weight_decay: float = 1e-3
     gamma: float = 0.99
     tau: float = 0.01
@@ -258,7 +260,7 @@ class DDPGConfig:
             _require(getattr(self, name) >= 0, f"ddpg.{name}", getattr(self, name), "at least 0")
         for name in ("actor_learning_rate", "critic_learning_rate"):
             _require(_positive(getattr(self, name)), f"ddpg.{name}", getattr(self, name), "a number above 0")
-        for name in ("critic_weight_decay", "exploration_noise"):
+        for name in ("learning_rate_decay", "critic_weight_decay", "exploration_noise"):
             _require(_at_least_zero(getattr(self, name)), f"ddpg.{name}", getattr(self, name), "a number of at least 0")
         for name in ("gamma", "tau", "random_action_probability"):
             _require(0.0 <= getattr(self, name) <= 1.0, f"ddpg.{name}", getattr(self, name), "a number in [0, 1]")

@@ -85,24 +85,36 @@ class DDPG:
     """DDPG for one environment and one source of v_h. Holds no state of its own."""
 
     def __init__(
-        self, env: Env, conditioning: NetworkInputs, config: DDPGConfig, num_envs: int, embedding_learning_rate: float
+        self,
+        env: Env,
+        conditioning: NetworkInputs,
+        config: DDPGConfig,
+        num_envs: int,
+        num_iterations: int,
+        embedding_learning_rate: float,
     ):
         """Args:
         env: a goal-conditioned environment over a pool.
         conditioning: builds the networks' inputs for the robots of that pool.
         config: settings; `buffer_episodes` must be at least `num_envs`.
         num_envs: episodes collected per iteration.
+        num_iterations: length of the run, for the learning rates' decay.
         embedding_learning_rate: Adam's step for a learned v_h.
         """
         self.env, self.conditioning, self.config, self.num_envs = env, conditioning, config, num_envs
         self.actor = DeterministicActor(config.hidden_sizes, env.action_size, config.layer_norm)
         self.critic = Critic(config.hidden_sizes, config.layer_norm)
-        decay = optax.add_decayed_weights(config.critic_weight_decay, mask=mark_kernels)
+        weight_decay = optax.add_decayed_weights(config.critic_weight_decay, mask=mark_kernels)
+        num_updates = num_iterations * config.updates_per_iteration
+
+        def adam(rate: float) -> optax.GradientTransformation:
+            return optax.adam(optax.linear_schedule(rate, rate * config.learning_rate_decay, num_updates))
+
         self._optimizer = optax.multi_transform(
             {
-                "actor": optax.adam(config.actor_learning_rate),
-                "critic": optax.chain(decay, optax.adam(config.critic_learning_rate)),
-                "embedding": optax.adam(embedding_learning_rate),
+                "actor": adam(config.actor_learning_rate),
+                "critic": optax.chain(weight_decay, adam(config.critic_learning_rate)),
+                "embedding": adam(embedding_learning_rate),
             },
             {"actor": "actor", "critic": "critic", "embedding": "embedding"},
         )

@@ -59,7 +59,9 @@ def time_with_updates(run: ArmExperiment, num_updates: int, seconds: float) -> f
     """Seconds of an iteration with `num_updates`, without a warm-up."""
     config = dataclasses.replace(run.config.ddpg, updates_per_iteration=num_updates, warmup_episodes=0)
     learner = run.learner
-    learner = DDPG(learner.env, learner.conditioning, config, learner.num_envs, run.config.embedding.learning_rate)
+    learner = DDPG(
+        learner.env, learner.conditioning, config, learner.num_envs, run.num_iterations, run.config.embedding.learning_rate
+    )
     return time_iteration(learner.train, learner.init(jax.random.key(run.config.seed)), seconds)
 
 

@@ -108,14 +108,15 @@ def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:
         stepped = dataclasses.replace(task, integrator=integrator, goal_lift=goal_lift)
         return GoalEnv(stepped, pool, make_physics(engine, pool, stepped.sim_dt, integrator))
 
+    num_iterations = -(-config.total_env_steps // config.batch_size)
     learner = DDPG(
         make_env(train_pool, goal_lift=env_config.goal_lift),
         make_goal_conditioning(config, train_pool, train_pool),
         config.ddpg,
         config.resolved_num_envs,
+        num_iterations,
         config.embedding.learning_rate,
     )
-    num_iterations = -(-config.total_env_steps // config.batch_size)
     evaluator = make_evaluator(config, learner, make_env, heldout_pool, train_pool)
     return ArmExperiment(config, physics, train_pool, heldout_pool, learner, make_env, num_iterations, evaluator)
 

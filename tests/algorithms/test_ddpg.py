@@ -28,7 +28,9 @@ CONFIG = DDPGConfig(
 def make(directions=(1.0,), learned=False, diverging=False, **changes) -> DDPG:
     env = PlaneEnv(directions, diverging=diverging)
     config = dataclasses.replace(CONFIG, **changes)
-    return DDPG(env, PlaneInputs(len(directions), learned), config, num_envs=10, embedding_learning_rate=3e-3)
+    return DDPG(
+        env, PlaneInputs(len(directions), learned), config, num_envs=10, num_iterations=40, embedding_learning_rate=3e-3
+    )
 
 
 def success_rate(learner: DDPG, state: DDPGState, num_episodes: int = 200) -> float:
@@ -52,6 +54,17 @@ def test_a_sparse_goal_is_learned_with_hindsight_and_not_without():
     with_hindsight, without = (make(relabel=relabel) for relabel in ("future", "none"))
     assert success_rate(with_hindsight, trained(with_hindsight)) > 0.9
     assert success_rate(without, trained(without)) < 0.7
+
+
+def test_learning_rates_have_fallen_to_their_decay_at_the_end_of_the_run():
+    learner = make(learning_rate_decay=0.0, critic_weight_decay=0.0, warmup_episodes=0)
+    at_start, at_end = (trained(learner, number).params for number in (2, 40))
+    learning, stopped = (
+        max(float(jnp.abs(a - b).max()) for a, b in zip(jax.tree.leaves(params), jax.tree.leaves(after), strict=True))
+        for params, after in ((at_start, trained(learner, 3).params), (at_end, trained(learner, 41).params))
+    )
+    assert learning > 1e-3
+    assert stopped < 1e-6
 
 
 def test_robots_that_need_opposite_actions_are_solved_with_an_embedding_and_not_without():

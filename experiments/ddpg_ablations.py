@@ -1,0 +1,35 @@
+"""What each change from `paper` to `fast` is worth: the reacher of Exp. I with `fast`, and with one change at a time undone.
+
+`python -m hcp_jax.sweep experiments/ddpg_ablations.py --summary results/ablations/ddpg.json`
+"""
+
+import dataclasses
+
+from hcp_jax import presets
+from hcp_jax.config import Config, DDPGConfig
+
+PAPER = DDPGConfig()
+CHANGES = {
+    "fast": {},
+    "without_layer_norm": {"layer_norm": PAPER.layer_norm},
+    "without_normalized_inputs": {"normalize_inputs": PAPER.normalize_inputs},
+    "with_the_papers_learning_rates": {
+        "actor_learning_rate": PAPER.actor_learning_rate,
+        "critic_learning_rate": PAPER.critic_learning_rate,
+    },
+    "with_the_papers_batch_size": {"batch_size": PAPER.batch_size},
+}
+
+
+def get_configs() -> list[Config]:
+    return [
+        presets.arm(
+            f"reacher_{name}",
+            "reacher",
+            "chain_fk",
+            left_out="H",
+            total_env_steps=1_536_000,
+            ddpg=dataclasses.replace(presets.FAST_DDPG, **change),
+        )
+        for name, change in CHANGES.items()
+    ]
