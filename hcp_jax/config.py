@@ -226,6 +226,7 @@ class DDPGConfig:
         updates_per_iteration: updates after each iteration's `num_envs` episodes (paper: 100 after every episode).
         relabel: HER's goals: `future`, `final` or `none`.
         future_k: relabelled goals for each original one.
+        future_candidates: future states drawn for a relabelled goal, of which the nearest to the episode's own goal is taken.
         exploration_noise: standard deviation of the Gaussian added to actions.
         random_action_probability: share of actions that are uniform instead.
         layer_norm: LayerNorm before each SELU.
@@ -247,6 +248,7 @@ class DDPGConfig:
     updates_per_iteration: int = 100
     relabel: str = "future"
     future_k: int = 4
+    future_candidates: int = 1
     exploration_noise: float = 0.1
     random_action_probability: float = 0.1
     layer_norm: bool = False
@@ -254,7 +256,7 @@ class DDPGConfig:
     double_critic: bool = False
 
     def __post_init__(self):
-        for name in ("batch_size", "buffer_episodes", "updates_per_iteration"):
+        for name in ("batch_size", "buffer_episodes", "updates_per_iteration", "future_candidates"):
             _require(getattr(self, name) >= 1, f"ddpg.{name}", getattr(self, name), "at least 1")
         for name in ("warmup_episodes", "future_k"):
             _require(getattr(self, name) >= 0, f"ddpg.{name}", getattr(self, name), "at least 0")

@@ -57,8 +57,8 @@ def hopper_paper(name: str, encoding: str, **changes) -> Config:
     return dataclasses.replace(Config(name=name, encoding=encoding, num_envs=PAPER_NUM_ENVS), **changes)
 
 
-# 128 episodes, then 500 updates of 256 steps: a thirteenth of the paper's steps per episode. LayerNorm and whitened inputs allow
-# five times the step size.
+# 128 episodes, then 500 updates of 256 steps: a thirteenth of the paper's steps per episode. LayerNorm and whitened inputs
+# allow five times the step size.
 FAST_DDPG = DDPGConfig(
     preset="fast",
     layer_norm=True,

@@ -233,12 +233,13 @@ class DDPG:
 
     def _learn(self, state: DDPGState, key: jax.Array) -> DDPGState:
         """All updates of one iteration."""
+        config = self.config
 
         def update(carry, key):
             params, target_params, opt_state = carry
             key_sample, key_goals = jax.random.split(key)
-            sample = sample_steps(state.replay, key_sample, self.config.batch_size)
-            goal = relabel_goals(state.replay, sample, key_goals, self.config.relabel, self.config.future_k)
+            sample = sample_steps(state.replay, key_sample, config.batch_size)
+            goal = relabel_goals(state.replay, sample, key_goals, config.relabel, config.future_k, config.future_candidates)
             grads, metrics = jax.grad(self._loss, has_aux=True)(params, target_params, state.statistics, sample, goal)
             updates, opt_state = self._optimizer.update(grads, opt_state, params)
             params: Any = optax.apply_updates(params, updates)

@@ -98,3 +98,12 @@ def test_final_goals_are_what_the_episode_achieved_last(key):
     goal = np.asarray(relabel_goals(replay, sample, key, "final", 4))[:, 0]
     relabelled = goal >= 0
     np.testing.assert_array_equal(goal[relabelled], 100 * np.asarray(sample.index)[relabelled] + 4)
+
+
+def test_of_many_future_goals_the_nearest_to_the_episodes_own_is_taken(key):
+    replay = filled(coded_episodes(0, 5, length=4))  # desired goals of -1: what is achieved first is nearest
+    sample = sample_steps(replay, jax.random.key(1), 200)
+    goal = np.asarray(relabel_goals(replay, sample, key, "future", 4, num_candidates=100))[:, 0]
+    relabelled = goal >= 0
+    first_ahead = 100 * np.asarray(sample.index) + np.asarray(sample.step) + 1
+    np.testing.assert_array_equal(goal[relabelled], first_ahead[relabelled])
