@@ -3,7 +3,7 @@
 | encoding | length beyond observation (14) and goal (3) | content |
 |---|---|---|
 | those of `hcp_jax.hardware.arm_encodings` | as there | a constant of the robot |
-| `chain_fk` | 48 + 57 | `chain`, and what it says at the observed joint angles: positions and axes of the joints, position and rotation of the end effector in the world (what the released code feeds), and end effector minus goal |
+| `chain_fk` | 57 | what `chain` says at the observed joint angles, as the released code feeds it: positions and axes of the joints, position and rotation of the end effector in the world; and end effector minus goal |
 | `embedding` | its size | learned with the policy (HCP-I) |
 | `none+end_effector` | 3 | no v_h, but the end effector's position: a control |
 | `none+goal_offset` | 3 | no v_h, but end effector minus goal: a control |
@@ -42,8 +42,8 @@ class GoalConditioning:
         """
         self.encoding, self._embedding = encoding, embedding
         self.is_learned = embedding is not None
-        static = {"chain_fk": "chain", "none+end_effector": "none", "none+goal_offset": "none", "embedding": "none"}
-        self._table = jnp.asarray(encode_arms(pool, static.get(encoding, encoding), reference))
+        is_constant = encoding in ARM_ENCODINGS
+        self._table = jnp.asarray(encode_arms(pool, encoding if is_constant else "none", reference))
         self._chain_pos = jnp.asarray(pool.hardware["chain_pos"], jnp.float32)
         self._chain_rotation = quat_to_matrix(jnp.asarray(pool.hardware["chain_quat"], jnp.float32))
         self._joint_mask = jnp.asarray(pool.hardware["joint_mask"], jnp.float32)
