@@ -94,7 +94,7 @@ def arm(name: str, task: str, encoding: str, left_out: str = "", random_hole: fl
         task=task,
         algorithm="ddpg",
         encoding=encoding,
-        total_env_steps=5_120_000,
+        total_env_steps=7_680_000,
         eval_every=256_000,
         num_envs=FAST_NUM_ENVS,
         pool=ArmPoolConfig(types=tuple(t for t in ARM_TYPES if t not in left_out), left_out=tuple(left_out)),
