@@ -126,8 +126,8 @@ class ArmConfig:
     Attributes:
         integrator: `rk4` (1 ms, released code), `euler` (1 ms) or `implicitfast` (4 ms).
         random_hole: side of the cube [m] in which the hole is placed (paper: 0.2); 0 keeps it where it is.
-        goal_lift: half of the training goals of peg insertion lie up to so far [m] above the hole's target; evaluation has the
-            target alone.
+        approach_starts: share of the training episodes of peg insertion that start with the peg upright, in the hole or up to
+            0.1 m above it (a reverse curriculum, Florensa et al. 2017); evaluation never does.
         episode_length: control steps per episode (paper: 200).
         observation_noise: half-width of the uniform noise on joint angles [rad] and velocities [rad/s].
         success_distance: of the point of interest from the goal [m].
@@ -136,7 +136,7 @@ class ArmConfig:
 
     integrator: str = "implicitfast"
     random_hole: float = 0.0
-    goal_lift: float = 0.0
+    approach_starts: float = 0.0
     episode_length: int = 200
     observation_noise: float = 0.02
     success_distance: float = 0.02
@@ -146,7 +146,8 @@ class ArmConfig:
         _require(self.integrator in INTEGRATORS, "env.integrator", self.integrator, f"one of {', '.join(INTEGRATORS)}")
         _require(self.episode_length >= 1, "env.episode_length", self.episode_length, "at least 1")
         _require(_positive(self.success_distance), "env.success_distance", self.success_distance, "a number above 0")
-        for name in ("random_hole", "goal_lift", "observation_noise", "action_cost"):
+        _require(0.0 <= self.approach_starts <= 1.0, "env.approach_starts", self.approach_starts, "a number in [0, 1]")
+        for name in ("random_hole", "observation_noise", "action_cost"):
             _require(_at_least_zero(getattr(self, name)), f"env.{name}", getattr(self, name), "a number of at least 0")
 
 
@@ -364,6 +365,8 @@ class Config:
         if isinstance(self.pool, ArmPoolConfig) and self.task == "reacher":
             for name in (*self.pool.types, *self.pool.left_out):
                 _require(name not in OTHER_ARMS, "pool.types", name, "types A to I for the reacher (J and K hold a peg)")
+        if isinstance(self.env, ArmConfig) and self.task == "reacher":
+            _require(self.env.approach_starts == 0, "env.approach_starts", self.env.approach_starts, "0 for the reacher")
         if self.algorithm == "ppo":
             self._check_minibatches()
         else:

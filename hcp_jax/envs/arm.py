@@ -26,7 +26,7 @@ class ArmTask:
         name: `reacher` or `peg_insertion`.
         integrator: of the physics; sets the number of substeps (1 ms for rk4, 4 ms for implicitfast).
         random_hole: side of the cube [m] in which the hole's target is drawn, centred on `HOLE`; 0 keeps it there.
-        goal_lift: half of the goals of peg insertion lie up to so far [m] above the hole's target: a curriculum, for training.
+        approach_starts: share of episodes that start with the peg upright in the hole or above it; for training.
         episode_length: control steps.
         observation_noise: half-width of the uniform noise on angles [rad] and velocities [rad/s]; the observation's alone.
         success_distance: of the point of interest from the goal [m].
@@ -36,7 +36,7 @@ class ArmTask:
     name: str
     integrator: str = "implicitfast"
     random_hole: float = 0.0
-    goal_lift: float = 0.0
+    approach_starts: float = 0.0
     episode_length: int = 200
     observation_noise: float = 0.02
     success_distance: float = 0.02
@@ -54,15 +54,16 @@ class ArmTask:
         """[s]"""
         return CTRL_DT / self.num_substeps
 
-    def sample_goal(self, key: jax.Array, num_envs: int) -> tuple[jax.Array, jax.Array | None]:
-        """Goals for the point of interest [B, 3] m, and where the table stands [B, 1, 3] m or None without one."""
+    def sample_goal(self, key: jax.Array, num_envs: int) -> jax.Array:
+        """Goals for the point of interest: [B, 3] m."""
         if self.name == "reacher":
             low, high = jnp.asarray(REACHER_GOALS)
-            return jax.random.uniform(key, (num_envs, 3), minval=low, maxval=high), None
-        key_hole, key_lift = jax.random.split(key)
-        hole = jnp.asarray(HOLE) + self.random_hole * jax.random.uniform(key_hole, (num_envs, 3), minval=-0.5, maxval=0.5)
-        lift = self.goal_lift * jnp.maximum(jax.random.uniform(key_lift, (num_envs,), minval=-1.0, maxval=1.0), 0.0)
-        return hole.at[:, 2].add(lift), (hole - jnp.array([0.0, 0.0, TARGET_ABOVE_TABLE]))[:, None]
+            return jax.random.uniform(key, (num_envs, 3), minval=low, maxval=high)
+        return jnp.asarray(HOLE) + self.random_hole * jax.random.uniform(key, (num_envs, 3), minval=-0.5, maxval=0.5)
+
+    def table_position(self, goal: jax.Array) -> jax.Array | None:
+        """Where the table stands [B, 1, 3] for goals [B, 3]; None without one."""
+        return None if self.name == "reacher" else goal[:, None] - jnp.array([0.0, 0.0, TARGET_ABOVE_TABLE])
 
     def compute_reward(
         self, achieved_goal: jax.Array, desired_goal: jax.Array, action: jax.Array

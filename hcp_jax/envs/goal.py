@@ -5,6 +5,8 @@ The contract, each sentence a test:
 - Noise is on the observation; the achieved goal is where the point of interest is.
 - A world whose physics is not finite stays where it was last, and says so.
 - Actions of missing joints are 0 and cost nothing.
+- Where the task asks for approach starts, that share of episodes starts from the pool's `approach_angles`, with the goals that
+  belong to them.
 """
 
 from typing import Any, Protocol
@@ -62,10 +64,17 @@ class GoalTask(Protocol):
     def episode_length(self) -> int: ...
     @property
     def observation_noise(self) -> float: ...
-    def sample_goal(self, key: jax.Array, num_envs: int) -> tuple[jax.Array, jax.Array | None]: ...
+    @property
+    def approach_starts(self) -> float: ...
+    def sample_goal(self, key: jax.Array, num_envs: int) -> jax.Array: ...
+    def table_position(self, goal: jax.Array) -> jax.Array | None: ...
     def compute_reward(
         self, achieved_goal: jax.Array, desired_goal: jax.Array, action: jax.Array
     ) -> tuple[jax.Array, jax.Array]: ...
+
+
+# What a pool's hardware has for approach starts: joint angles [N, K, 7] rad and their goals [N, K, 3] m.
+APPROACH = ("approach_angles", "approach_goal")
 
 
 class GoalEnv:
@@ -79,19 +88,22 @@ class GoalEnv:
         hardware = {name: jnp.asarray(values, jnp.float32) for name, values in pool.hardware.items()}
         self._chain_pos, self._chain_rotation = hardware["chain_pos"], quat_to_matrix(hardware["chain_quat"])
         self._joint_mask, self._start_angles = hardware["joint_mask"], hardware["start_angles"]
+        self._approach = {name: hardware[name] for name in APPROACH if task.approach_starts}
 
     def reset(self, key: jax.Array, index: jax.Array) -> GoalState:
         """Starts an episode of the robots at positions `index` [B], each with a drawn start pose and goal."""
-        key, key_pose, key_goal, key_noise = jax.random.split(key, 4)
+        key, key_pose, key_goal, key_approach, key_noise = jax.random.split(key, 5)
         num_envs = index.shape[0]
         pose = jax.random.randint(key_pose, (num_envs,), 0, self._start_angles.shape[1])
-        desired_goal, table_position = self.task.sample_goal(key_goal, num_envs)
+        desired_goal = self.task.sample_goal(key_goal, num_envs)
         qpos = self._start_angles[index, pose]
+        if self._approach:
+            qpos, desired_goal = self._start_near_goal(key_approach, index, qpos, desired_goal)
         physics = PhysicsState(
             qpos=qpos,
             qvel=jnp.zeros_like(qpos),
             qacc_warmstart=jnp.zeros_like(qpos),
-            mocap_pos=table_position,
+            mocap_pos=self.task.table_position(desired_goal),
         )
         return GoalState(
             physics=physics,
@@ -124,6 +136,19 @@ class GoalEnv:
             overflow=overflow,
         )
         return next_state, transition
+
+    def _start_near_goal(
+        self, key: jax.Array, index: jax.Array, qpos: jax.Array, desired_goal: jax.Array
+    ) -> tuple[jax.Array, jax.Array]:
+        """Puts the task's share of episodes at one of their robots' approach poses, with its goal."""
+        key_share, key_pose = jax.random.split(key)
+        angles, goals = (self._approach[name] for name in APPROACH)
+        pose = jax.random.randint(key_pose, index.shape, 0, angles.shape[1])
+        chosen = jax.random.uniform(key_share, index.shape) < self.task.approach_starts
+        return (
+            jnp.where(chosen[:, None], angles[index, pose], qpos),
+            jnp.where(chosen[:, None], goals[index, pose], desired_goal),
+        )
 
     def _observe(self, physics: PhysicsState, index: jax.Array, key: jax.Array) -> jax.Array:
         """Noisy joint angles and velocities, 0 for missing joints: [B, 14]."""

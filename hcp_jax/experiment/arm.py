@@ -11,10 +11,11 @@ import numpy as np
 from hcp_jax.algorithms.ddpg import DDPG, DDPGState
 from hcp_jax.algorithms.replay import replay_bytes
 from hcp_jax.config import ArmConfig, ArmPoolConfig, Config
-from hcp_jax.envs.arm import ArmTask
+from hcp_jax.envs.arm import HOLE, ArmTask
 from hcp_jax.envs.goal import GoalEnv
 from hcp_jax.envs.goal_episodes import GoalEpisodes, GoalEvaluator
 from hcp_jax.experiment.base import EVALUATION_SEED, TRAIN
+from hcp_jax.hardware.approach_poses import add_approach_poses
 from hcp_jax.hardware.arm import TYPES
 from hcp_jax.hardware.arm_pool import make_arm_pool
 from hcp_jax.hardware.pool import RobotPool
@@ -103,14 +104,17 @@ def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:
     heldout_pool = make_heldout_arms(config, tuple(dict.fromkeys((*pools.types, *pools.left_out))), pools.heldout_per_type)
     task = ArmTask(config.task, **dataclasses.asdict(env_config))
 
-    def make_env(pool: RobotPool, engine: str = physics, goal_lift: float = 0.0) -> GoalEnv:
+    def make_env(pool: RobotPool, engine: str = physics, approach_starts: float = 0.0) -> GoalEnv:
         integrator = engine.removeprefix("native-") if engine.startswith("native-") else env_config.integrator
-        stepped = dataclasses.replace(task, integrator=integrator, goal_lift=goal_lift)
+        stepped = dataclasses.replace(task, integrator=integrator, approach_starts=approach_starts)
         return GoalEnv(stepped, pool, make_physics(engine, pool, stepped.sim_dt, integrator))
 
+    starts_pool = train_pool
+    if env_config.approach_starts:
+        starts_pool = add_approach_poses(train_pool, np.asarray(HOLE), env_config.random_hole, pools.seed)
     num_iterations = -(-config.total_env_steps // config.batch_size)
     learner = DDPG(
-        make_env(train_pool, goal_lift=env_config.goal_lift),
+        make_env(starts_pool, approach_starts=env_config.approach_starts),
         make_goal_conditioning(config, train_pool, train_pool),
         config.ddpg,
         config.resolved_num_envs,

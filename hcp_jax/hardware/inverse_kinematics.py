@@ -1,6 +1,7 @@
-"""Which goals an arm can reach at all: inverse kinematics within joint limits, collisions ignored, for many arms at once."""
+"""Inverse kinematics within joint limits, collisions ignored, for many arms at once: what they can reach, and how."""
 
 import functools
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -15,36 +16,46 @@ MAX_TILT = np.deg2rad(10.0)  # of a peg in its hole
 _TILT_WEIGHT = 0.05  # [m/rad]
 
 
-def solve_positions(pool: RobotPool, goal: np.ndarray, key: jax.Array, upright: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """How near the point of interest can come to a goal; damped least squares from random angles, the best of `NUM_STARTS`.
+class Solution(NamedTuple):
+    """angles [N, 7] rad, 0 for missing joints; distance [N] m of the point of interest from its goal; tilt [N] rad of its z
+    axis from upright, 0 where that was not asked for."""
+
+    angles: np.ndarray
+    distance: np.ndarray
+    tilt: np.ndarray
+
+
+def solve_positions(
+    pool: RobotPool, goal: np.ndarray, key: jax.Array, upright: bool = False, starts: np.ndarray | jax.Array | None = None
+) -> Solution:
+    """Brings the point of interest as near to a goal as it comes, by damped least squares.
 
     Args:
         pool: N arms.
         goal: [N, 3] m, one for each.
-        key: for the starts.
+        key: for random starts.
         upright: also ask for the z axis of the point of interest to stand upright.
-
-    Returns:
-        distance [N] in m and tilt [N] in rad (0 unless `upright`) of the best solution.
+        starts: angles to start from [N, S, 7] rad, of which the best end counts; by default `NUM_STARTS` random ones.
     """
     hardware = {name: jnp.asarray(values, jnp.float32) for name, values in pool.hardware.items()}
     rotation = quat_to_matrix(hardware["chain_quat"])
     low, high = jnp.moveaxis(hardware["joint_range"], -1, 0)
     share = jax.random.uniform(key, (NUM_STARTS, *low.shape))
-    starts = jnp.swapaxes(low + share * (high - low), 0, 1)
+    random_starts = jnp.swapaxes(low + share * (high - low), 0, 1)
     solve = jax.jit(jax.vmap(functools.partial(_solve_arm, upright=upright)))
-    distance, tilt = solve(hardware["chain_pos"], rotation, low, high, hardware["joint_mask"], jnp.asarray(goal), starts)
-    return np.asarray(distance), np.asarray(tilt)
+    mask = hardware["joint_mask"]
+    starts = random_starts if starts is None else jnp.asarray(starts)
+    return Solution(*map(np.asarray, solve(hardware["chain_pos"], rotation, low, high, mask, jnp.asarray(goal), starts)))
 
 
 def is_reachable(pool: RobotPool, goal: np.ndarray, within: float, key: jax.Array, upright: bool = False) -> np.ndarray:
     """Whether each arm can bring its point of interest `within` [m] of its goal [N, 3], and if asked upright: [N] bool."""
-    distance, tilt = solve_positions(pool, goal, key, upright)
-    return (distance < within) & (tilt < MAX_TILT)
+    solution = solve_positions(pool, goal, key, upright)
+    return (solution.distance < within) & (solution.tilt < MAX_TILT)
 
 
 def _solve_arm(chain_pos, chain_rotation, low, high, mask, goal, starts, *, upright: bool):
-    """The best distance and tilt of one arm over its starts [S, 7]."""
+    """The best angles of one arm over its starts [S, 7], with their distance and tilt."""
 
     def pose(angles):
         positions, rotations = joint_poses(chain_pos, chain_rotation, angles * mask)
@@ -65,8 +76,8 @@ def _solve_arm(chain_pos, chain_rotation, low, high, mask, goal, starts, *, upri
     def solve(start):
         angles = jax.lax.scan(step, start, None, length=NUM_STEPS)[0]
         error, tilt = pose(angles)
-        return jnp.linalg.norm(error), tilt if upright else jnp.zeros(())
+        return angles * mask, jnp.linalg.norm(error), tilt if upright else jnp.zeros(())
 
-    distance, tilt = jax.vmap(solve)(starts)
+    angles, distance, tilt = jax.vmap(solve)(starts)
     best = jnp.argmin(distance + _TILT_WEIGHT * tilt)
-    return distance[best], tilt[best]
+    return angles[best], distance[best], tilt[best]

@@ -7,6 +7,7 @@ from scipy.optimize import least_squares
 
 from hcp_jax.envs.arm import HOLE, REACHER_GOALS, ArmTask
 from hcp_jax.envs.goal import GoalEnv
+from hcp_jax.hardware.approach_poses import MAX_HEIGHT, add_approach_poses
 from hcp_jax.hardware.arm import arm_spec
 from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES, make_arm_pool, make_chain_pool
 from hcp_jax.hardware.chain import read_chain
@@ -16,6 +17,8 @@ from hcp_jax.physics.base import make_physics
 
 def make_env(task: ArmTask, types: str = "AI", num_per_type: int = 2) -> GoalEnv:
     pool = make_arm_pool(task.name, ArmRanges(), types, num_per_type, seed=4)
+    if task.approach_starts:
+        pool = add_approach_poses(pool, np.asarray(HOLE), task.random_hole, seed=4)
     return GoalEnv(task, pool, make_physics("native", pool, task.sim_dt, task.integrator))
 
 
@@ -39,22 +42,25 @@ def test_a_reward_is_1_within_2_cm_and_minus_1_elsewhere_less_the_action():
 
 
 def test_goals_fill_the_papers_boxes(key):
-    goals, _ = ArmTask("reacher").sample_goal(key, 2000)
+    goals = ArmTask("reacher").sample_goal(key, 2000)
     np.testing.assert_allclose(goals.min(0), REACHER_GOALS[0], atol=0.01)
     np.testing.assert_allclose(goals.max(0), REACHER_GOALS[1], atol=0.01)
     assert abs(np.corrcoef(np.asarray(goals).T)[0, 1]) < 0.1, "not the box's diagonal"
-    np.testing.assert_allclose(ArmTask("peg_insertion").sample_goal(key, 3)[0], np.tile(HOLE, (3, 1)), rtol=1e-6)
-    holes, _ = ArmTask("peg_insertion", random_hole=0.2).sample_goal(key, 2000)
+    np.testing.assert_allclose(ArmTask("peg_insertion").sample_goal(key, 3), np.tile(HOLE, (3, 1)), rtol=1e-6)
+    holes = ArmTask("peg_insertion", random_hole=0.2).sample_goal(key, 2000)
     np.testing.assert_allclose(holes.max(0) - holes.min(0), 0.2, atol=0.01)
 
 
-def test_half_of_the_lifted_goals_lie_above_the_hole_whose_table_stays(key):
-    goals, table = ArmTask("peg_insertion", goal_lift=0.2).sample_goal(key, 2000)
-    lift = np.asarray(goals)[:, 2] - HOLE[2]
-    assert lift.min() == 0.0
-    assert 0.19 < lift.max() <= 0.2
-    assert 0.45 < (lift > 0).mean() < 0.55
-    np.testing.assert_allclose(table, ArmTask("peg_insertion").sample_goal(key, 2000)[1], atol=1e-6)
+def test_the_asked_share_of_episodes_starts_with_the_peg_upright_above_its_hole(key):
+    env = make_env(ArmTask("peg_insertion", random_hole=0.1, approach_starts=0.25), "I", 3)
+    state = env.reset(key, jnp.tile(jnp.arange(3), 200))
+    lift = np.asarray(state.achieved_goal - state.desired_goal)
+    started_near = np.linalg.norm(lift[:, :2], axis=1) < 0.006
+    assert 0.2 < started_near.mean() < 0.3
+    assert -0.006 < lift[started_near, 2].min() < 0.02
+    assert 0.08 < lift[started_near, 2].max() < MAX_HEIGHT + 0.006
+    np.testing.assert_allclose(state.physics.mocap_pos[:, 0, :2], state.desired_goal[:, :2], atol=1e-6)
+    np.testing.assert_array_equal(state.physics.qpos[~started_near], 0.0)
 
 
 def test_the_table_stands_around_the_goal(key):

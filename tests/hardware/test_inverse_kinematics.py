@@ -19,8 +19,10 @@ def test_where_an_arm_has_been_it_can_come_again(arms, rng):
     angles = rng.uniform(0.8 * low, 0.8 * high) * arms.hardware["joint_mask"]
     pos, quat = (jnp.asarray(arms.hardware[name], jnp.float32) for name in ("chain_pos", "chain_quat"))
     goal = np.asarray(joint_poses(pos, quat_to_matrix(quat), jnp.asarray(angles))[0][:, -1])
-    distance, _ = solve_positions(arms, goal, jax.random.key(0))
-    np.testing.assert_allclose(distance, 0.0, atol=5e-3)
+    solution = solve_positions(arms, goal, jax.random.key(0))
+    np.testing.assert_allclose(solution.distance, 0.0, atol=5e-3)
+    reached = np.asarray(joint_poses(pos, quat_to_matrix(quat), jnp.asarray(solution.angles))[0][:, -1])
+    np.testing.assert_allclose(np.linalg.norm(reached - goal, axis=1), solution.distance, atol=1e-5)
 
 
 def test_nothing_is_reached_3_m_away(arms):
@@ -29,5 +31,5 @@ def test_nothing_is_reached_3_m_away(arms):
 
 def test_the_hole_is_reached_upright_by_all_types_even_without_the_wrist(arms):
     goal = np.tile([0.6, 0.0, 0.0], (15, 1))
-    distance, tilt = solve_positions(arms, goal, jax.random.key(0), upright=True)
-    assert ((distance < 0.02) & (tilt < MAX_TILT)).mean() > 0.9
+    solution = solve_positions(arms, goal, jax.random.key(0), upright=True)
+    assert ((solution.distance < 0.02) & (solution.tilt < MAX_TILT)).mean() > 0.9
