@@ -36,6 +36,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--seed", type=int, default=0, help="seed of the initial states")
     parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
     parser.add_argument("--json", type=pathlib.Path, help="file to write the whole record to")
+    parser.add_argument("--without-robots", action="store_true", help="leave the rows of single robots out of that file")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
         for name in ("trials", "robots_per_trial"):
@@ -57,7 +58,9 @@ def main(arguments: list[str] | None = None) -> None:
             record = evaluate_arms(options.run, types=options.types or (), **settings)
     print_table(record)
     if options.json:
-        write_json(options.json, record)
+        write_json(
+            options.json, {name: value for name, value in record.items() if name != "robots" or not options.without_robots}
+        )
 
 
 def read_range(name: str, low: str, high: str) -> RangeChange:

@@ -197,6 +197,15 @@ def test_evaluate_writes_the_promised_record(finished_run, tmp_path, capsys):
     assert "heldout_fitted" in capsys.readouterr().out
 
 
+def test_rows_of_single_robots_can_be_left_out_of_the_record(finished_arms, tmp_path):
+    path = tmp_path / "record.json"
+    arguments = ["--types", "I", "--trials", "1", "--robots-per-trial", "1", "--without-robots", "--json", str(path)]
+    evaluate.main([str(finished_arms), *arguments])
+    record = json.loads(path.read_text())
+    assert list(record["types"]) == ["I"]
+    assert "robots" not in record
+
+
 def test_field_names_are_those_of_the_json_file():
     assert "ppo.learning_rate" in field_names(Config)
     with pytest.raises(ConfigError, match="expected a list of float"):
