@@ -127,7 +127,7 @@ class ArmConfig:
         integrator: `rk4` (1 ms, released code), `euler` (1 ms) or `implicitfast` (4 ms).
         random_hole: side of the cube [m] in which the hole is placed (paper: 0.2); 0 keeps it where it is.
         approach_starts: share of the training episodes of peg insertion that start with the peg upright, in the hole or up to
-            0.1 m above it (a reverse curriculum, Florensa et al. 2017); evaluation never does.
+            0.15 m above it (a reverse curriculum, Florensa et al. 2017); evaluation never does.
         episode_length: control steps per episode (paper: 200).
         observation_noise: half-width of the uniform noise on joint angles [rad] and velocities [rad/s].
         success_distance: of the point of interest from the goal [m].
@@ -228,7 +228,10 @@ class DDPGConfig:
         relabel: HER's goals: `future`, `final` or `none`.
         future_k: relabelled goals for each original one.
         future_candidates: future states drawn for a relabelled goal, of which the nearest to the episode's own goal is taken.
+        actor_average: what a running mean of the actors keeps of itself at each iteration; that mean is what is evaluated
+            (0: the actor itself).
         exploration_noise: standard deviation of the Gaussian added to actions.
+        exploration_correlation: of that Gaussian from one step to the next (0: white, as the paper's).
         random_action_probability: share of actions that are uniform instead.
         layer_norm: LayerNorm before each SELU.
         normalize_inputs: whiten the networks' inputs by running statistics.
@@ -250,7 +253,9 @@ class DDPGConfig:
     relabel: str = "future"
     future_k: int = 4
     future_candidates: int = 1
+    actor_average: float = 0.0
     exploration_noise: float = 0.1
+    exploration_correlation: float = 0.0
     random_action_probability: float = 0.1
     layer_norm: bool = False
     normalize_inputs: bool = False
@@ -267,6 +272,8 @@ class DDPGConfig:
             _require(_at_least_zero(getattr(self, name)), f"ddpg.{name}", getattr(self, name), "a number of at least 0")
         for name in ("gamma", "tau", "random_action_probability"):
             _require(0.0 <= getattr(self, name) <= 1.0, f"ddpg.{name}", getattr(self, name), "a number in [0, 1]")
+        for name in ("actor_average", "exploration_correlation"):
+            _require(0.0 <= getattr(self, name) < 1.0, f"ddpg.{name}", getattr(self, name), "a number in [0, 1)")
         _require(self.relabel in RELABEL_STRATEGIES, "ddpg.relabel", self.relabel, f"one of {', '.join(RELABEL_STRATEGIES)}")
         sizes = self.hidden_sizes
         _require(len(sizes) >= 2 and min(sizes) >= 1, "ddpg.hidden_sizes", sizes, "at least two sizes of at least 1")

@@ -7,8 +7,10 @@ train(state, n):                         one jitted call, buffers donated
     for each of updates_per_iteration:   draw steps, relabel goals, reward them
                                          critic towards r + gamma (1 - success) Q', actor up the critic
                                          targets follow
+    the mean of the actors, which is evaluated, follows
 """
 
+import math
 from typing import Any, ClassVar, Protocol
 
 import jax
@@ -55,15 +57,17 @@ class NetworkInputs(Protocol):
 class DDPGState:
     """Everything that training carries from one iteration to the next.
 
-    iteration: [] int32 iterations done; statistics: of the networks' inputs; diverged: [N] int32 episodes that each robot lost
+    iteration: [] int32 iterations done; average_actor: running mean of the actors after each iteration, the policy that is
+    evaluated; statistics: of the networks' inputs; diverged: [N] int32 episodes that each robot lost
     to non-finite physics; overflow: [] int32; sums: running sums of metrics since they were last read.
     """
 
-    policy_fields: ClassVar = ("iteration", "params", "statistics")
+    policy_fields: ClassVar = ("iteration", "params", "average_actor", "statistics")
 
     iteration: jax.Array
     params: Any
     target_params: Any
+    average_actor: Any
     opt_state: Any
     statistics: running_statistics.RunningStatisticsState
     replay: Replay
@@ -141,6 +145,7 @@ class DDPG:
             iteration=jnp.int32(0),
             params=params,
             target_params=jax.tree.map(jnp.copy, {name: params[name] for name in ("actor", "critic")}),
+            average_actor=jax.tree.map(jnp.copy, params["actor"]),
             opt_state=self._optimizer.init(params),
             statistics=running_statistics.init_state(specs.Array((self.conditioning.size,), jnp.float32)),
             replay=init_replay(self.buffer_shapes()),
@@ -149,6 +154,10 @@ class DDPG:
             overflow=jnp.int32(0),
             sums=zero_sums(),
         )
+
+    def policy(self, state: DDPGState) -> tuple[Params, Any]:
+        """What `mean_action` plays with the averaged actor: its params and statistics."""
+        return state.params | {"actor": state.average_actor}, state.statistics
 
     def mean_action(
         self, params: Params, statistics, conditioning: NetworkInputs, index: jax.Array, obs: jax.Array, goal: jax.Array
@@ -184,16 +193,22 @@ class DDPG:
 
     def _collect(self, state: DDPGState, key: jax.Array) -> tuple[EpisodeBatch, jax.Array, jax.Array, dict]:
         """Plays `num_envs` episodes with the exploring policy; also which diverged [B], overflows [] and metrics."""
-        key_robots, key_reset, key_steps = jax.random.split(key, 3)
+        key_robots, key_reset, key_noise, key_steps = jax.random.split(key, 4)
         first = self.env.reset(key_reset, draw_robots(key_robots, self.env.num_robots, self.num_envs))
+        correlation = self.config.exploration_correlation
 
-        def step(env_state: GoalState, key: jax.Array):
-            action = self._explore(state, env_state, key)
+        def step(carry: tuple[GoalState, jax.Array], key: jax.Array):
+            env_state, noise = carry
+            key_noise, key_action = jax.random.split(key)
+            fresh = jax.random.normal(key_noise, noise.shape)
+            noise = correlation * noise + math.sqrt(1.0 - correlation**2) * fresh
+            action = self._explore(state, env_state, noise, key_action)
             next_state, transition = self.env.step(env_state, action)
-            return next_state, (env_state.obs, env_state.achieved_goal, transition)
+            return (next_state, noise), (env_state.obs, env_state.achieved_goal, transition)
 
+        first_noise = jax.random.normal(key_noise, (self.num_envs, self.env.action_size))
         keys = jax.random.split(key_steps, self.env.episode_length)
-        last, (obs, achieved_goal, transitions) = jax.lax.scan(step, first, keys)
+        (last, _), (obs, achieved_goal, transitions) = jax.lax.scan(step, (first, first_noise), keys)
         ended = jnp.cumsum(transitions.diverged, axis=0) > 0
         episodes = EpisodeBatch(
             obs=jnp.swapaxes(jnp.concatenate([obs, last.obs[None]]), 0, 1),
@@ -211,13 +226,13 @@ class DDPG:
         }
         return episodes, ended[-1], jnp.sum(transitions.overflow), sums
 
-    def _explore(self, state: DDPGState, env_state: GoalState, key: jax.Array) -> jax.Array:
-        """The policy's action with Gaussian noise, or a uniform one: always while the buffer warms up."""
-        key_noise, key_uniform, key_choice = jax.random.split(key, 3)
+    def _explore(self, state: DDPGState, env_state: GoalState, noise: jax.Array, key: jax.Array) -> jax.Array:
+        """The policy's action with standard Gaussian `noise` scaled, or a uniform one: always while the buffer warms up."""
+        key_uniform, key_choice = jax.random.split(key)
         mean = self.mean_action(
             state.params, state.statistics, self.conditioning, env_state.index, env_state.obs, env_state.desired_goal
         )
-        noisy = mean + self.config.exploration_noise * jax.random.normal(key_noise, mean.shape)
+        noisy = mean + self.config.exploration_noise * noise
         uniform = jax.random.uniform(key_uniform, mean.shape, minval=-1.0, maxval=1.0)
         is_warm = state.replay.num_added >= self.config.warmup_episodes
         share = jnp.where(is_warm, self.config.random_action_probability, 1.0)
@@ -251,8 +266,14 @@ class DDPG:
         carry, metrics = jax.lax.scan(update, (state.params, state.target_params, state.opt_state), keys)
         params, target_params, opt_state = carry
         sums = {name: state.sums[name] + jnp.sum(metrics[name]) for name in LOSS_METRICS}
-        sums["updates"] = state.sums["updates"] + self.config.updates_per_iteration
-        return state.replace(params=params, target_params=target_params, opt_state=opt_state, sums=state.sums | sums)
+        sums["updates"] = state.sums["updates"] + config.updates_per_iteration
+        return state.replace(
+            params=params,
+            target_params=target_params,
+            average_actor=optax.incremental_update(params["actor"], state.average_actor, 1.0 - config.actor_average),
+            opt_state=opt_state,
+            sums=state.sums | sums,
+        )
 
     def _loss(self, params: Params, target_params: dict, statistics, sample: StepSample, goal: jax.Array):
         """Critic and actor loss in one: no gradient of one reaches the other's network, both reach a learned v_h.

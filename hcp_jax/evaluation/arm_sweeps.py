@@ -88,7 +88,7 @@ def evaluate_arms(
         evaluator = make_evaluator(config, run.learner, run.make_env, pool, run.train_pool)
         key_play, key_goal = jax.random.split(jax.random.fold_in(jax.random.key(seed), TYPES.index(name)))
         index = np.arange(count) % pool.num_robots
-        episodes = evaluator((state.params, state.statistics), index, key_play)
+        episodes = evaluator(run.learner.policy(state), index, key_play)
         goals = np.asarray(episodes.desired_goal)
         reachable = is_reachable(pool.subset(index), goals, env_config.success_distance, key_goal, upright)
         record["types"][name] = {"zero_shot": name not in pools.types} | summarise_type(episodes, reachable, trials)

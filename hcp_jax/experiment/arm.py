@@ -54,8 +54,8 @@ class ArmExperiment:
 
     def evaluate(self, state: DDPGState) -> tuple[dict[str, float | None], str]:
         """Success in percent of one episode per held-out robot, by kind and by type, and what to say about it."""
-        params = (state.params, state.statistics)
-        episodes = self.evaluator(params, np.arange(self.heldout_pool.num_robots), jax.random.key(EVALUATION_SEED))
+        policy = self.learner.policy(state)
+        episodes = self.evaluator(policy, np.arange(self.heldout_pool.num_robots), jax.random.key(EVALUATION_SEED))
         types = np.asarray([TYPES[int(number)] for number in self.heldout_pool.hardware["type"][:, 0]])
         names = tuple(dict.fromkeys(types))
         untrained = [name for name in names if name not in self.pool_config.types]

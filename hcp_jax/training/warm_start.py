@@ -93,6 +93,7 @@ def _start_ddpg(source: DDPGState, state: DDPGState, all_layers: bool) -> DDPGSt
     return state.replace(
         params=copy_tree(networks) | {"embedding": _centre_embedding(source, state)},
         target_params=copy_tree(networks),
+        average_actor=copy_tree(networks["actor"]),
         statistics=copy_tree(source.statistics),
     )
 

@@ -38,9 +38,7 @@ def success_rate(learner: DDPG, state: DDPGState, num_episodes: int = 200) -> fl
     index = jnp.arange(num_episodes, dtype=jnp.int32) % learner.env.num_robots
     env_state, reached = learner.env.reset(jax.random.key(7), index), jnp.zeros(num_episodes, bool)
     for _ in range(learner.env.episode_length):
-        action = learner.mean_action(
-            state.params, state.statistics, learner.conditioning, index, env_state.obs, env_state.desired_goal
-        )
+        action = learner.mean_action(*learner.policy(state), learner.conditioning, index, env_state.obs, env_state.desired_goal)
         env_state, transition = learner.env.step(env_state, action)
         reached |= transition.success
     return float(reached.mean())
@@ -131,6 +129,26 @@ def test_two_critics_value_a_step_no_higher_than_one():
     assert make()._values(single.params["critic"], inputs, action).shape == (1, 1)
 
 
+def test_the_policy_is_a_running_mean_of_the_actors():
+    plain, averaged = trained(make(), 3), trained(make(actor_average=0.75), 3)
+    before, after = (trained(make(actor_average=0.75), number) for number in (3, 4))
+    jax.tree.map(np.testing.assert_array_equal, plain.average_actor, averaged.params["actor"])
+    expected = jax.tree.map(lambda mean, actor: 0.75 * mean + 0.25 * actor, before.average_actor, after.params["actor"])
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, atol=1e-6), after.average_actor, expected)
+    played, _ = make().policy(after)
+    jax.tree.map(np.testing.assert_array_equal, played["actor"], after.average_actor)
+
+
+def test_exploration_noise_is_correlated_from_step_to_step_as_asked():
+    for correlation in (0.0, 0.8):
+        learner = make(exploration_correlation=correlation, random_action_probability=0.0, exploration_noise=0.1)
+        start = learner.init(jax.random.key(0))
+        warm = start.replace(replay=start.replay.replace(num_added=jnp.int32(CONFIG.warmup_episodes)))
+        actions = np.concatenate([learner._collect(warm, key)[0].action for key in jax.random.split(jax.random.key(1), 40)])
+        assert abs(actions.std() - 0.1) < 0.01, "an untrained actor does almost nothing"
+        assert abs(np.corrcoef(actions[:, :-1].ravel(), actions[:, 1:].ravel())[0, 1] - correlation) < 0.05
+
+
 def test_robots_are_drawn_without_favour(key):
     drawn = draw_robots(key, 4, 10)
     np.testing.assert_array_equal(np.sort(drawn[:4]), np.arange(4))
@@ -145,7 +163,14 @@ def test_weight_decay_is_on_kernels_alone():
 
 @pytest.mark.parametrize(
     "changes",
-    [{"future_k": -1}, {"relabel": "past"}, {"buffer_episodes": 0}, {"gamma": 1.5}, {"hidden_sizes": (8,)}],
+    [
+        {"future_k": -1},
+        {"relabel": "past"},
+        {"buffer_episodes": 0},
+        {"gamma": 1.5},
+        {"actor_average": 1.0},
+        {"hidden_sizes": (8,)},
+    ],
 )
 def test_settings_out_of_range_name_themselves(changes):
     with pytest.raises(ConfigError, match=f"ddpg.{next(iter(changes))}="):
