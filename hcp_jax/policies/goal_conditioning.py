@@ -3,10 +3,13 @@
 | encoding | length beyond observation (14) and goal (3) | content |
 |---|---|---|
 | those of `hcp_jax.hardware.arm_encodings` | as there | a constant of the robot |
-| `chain_fk` | 57 | what `chain` says at the observed joint angles, as the released code feeds it: positions and axes of the joints, position and rotation of the end effector in the world; and end effector minus goal |
+| `chain_fk` | 57 | what `chain` says at the observed joint angles, as the released code feeds it: positions and axes of the joints, position and rotation of the end effector in the world; and its offset from the goal |
 | `embedding` | its size | learned with the policy (HCP-I) |
 | `none+end_effector` | 3 | no v_h, but the end effector's position: a control |
-| `none+goal_offset` | 3 | no v_h, but end effector minus goal: a control |
+| `none+goal_offset` | 3 | no v_h, but the end effector's offset from the goal: a control |
+
+The offset is asinh((end effector - goal) / 0.02 m): a network that sees metres hardly tells 1 cm from 2 cm, and the goal's
+tolerance is 2 cm.
 """  # noqa: E501
 
 import jax
@@ -20,6 +23,7 @@ from hcp_jax.policies.conditioning import Embedding
 POSE_FEATURES = {"chain_fk": 57, "none+end_effector": 3, "none+goal_offset": 3}
 GOAL_CONDITIONINGS = (*ARM_ENCODINGS, *POSE_FEATURES, "embedding")
 NUM_JOINTS = 7
+OFFSET_SCALE = 0.02  # [m]
 
 
 class GoalConditioning:
@@ -67,8 +71,14 @@ class GoalConditioning:
         if self.encoding == "none+end_effector":
             return [end_effector]
         if self.encoding == "none+goal_offset":
-            return [end_effector - goal]
+            return [scale_offset(end_effector - goal)]
         mask = self._joint_mask[index][..., None]
         flat = (*angles.shape[:-1], -1)
         joints = [positions[..., :-1, :] * mask, rotations[..., :-1, :, 2] * mask]
-        return [part.reshape(flat) for part in (*joints, end_effector, rotations[..., -1, :, :], end_effector - goal)]
+        tip = [end_effector, rotations[..., -1, :, :], scale_offset(end_effector - goal)]
+        return [part.reshape(flat) for part in joints + tip]
+
+
+def scale_offset(offset: jax.Array) -> jax.Array:
+    """An offset in m, linear within `OFFSET_SCALE` and logarithmic beyond it."""
+    return jnp.arcsinh(offset / OFFSET_SCALE)

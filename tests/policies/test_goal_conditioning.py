@@ -1,0 +1,73 @@
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+
+from hcp_jax.hardware.arm_pool import make_arm_pool
+from hcp_jax.hardware.pool import RobotPool
+from hcp_jax.hardware.ranges import ArmRanges
+from hcp_jax.policies.conditioning import Embedding
+from hcp_jax.policies.goal_conditioning import GOAL_CONDITIONINGS, GoalConditioning
+
+LENGTHS = {"none": 0, "chain": 48, "chain_fk": 57, "chain+dynamics": 76, "dynamics": 28, "random": 28, "embedding": 5} | {
+    "none+end_effector": 3,
+    "none+goal_offset": 3,
+}
+GOAL = jnp.array([[0.5, 0.1, 0.2], [0.4, -0.2, 0.0]])
+
+
+@pytest.fixture(scope="module")
+def arms() -> RobotPool:
+    return make_arm_pool("reacher", ArmRanges(), ("D", "I"), 1, seed=3)
+
+
+def make(arms: RobotPool, encoding: str) -> GoalConditioning:
+    embedding = Embedding(arms.num_robots, 5, 0.1) if encoding == "embedding" else None
+    return GoalConditioning(arms, encoding, arms, observation_size=14, goal_size=3, embedding=embedding)
+
+
+def features(arms: RobotPool, encoding: str, angles: np.ndarray) -> np.ndarray:
+    """What each encoding adds to the observation and the goal, for both arms: [2, size]."""
+    conditioning = make(arms, encoding)
+    obs = jnp.concatenate([jnp.asarray(angles, jnp.float32), jnp.zeros((2, 7))], axis=1)
+    inputs = conditioning.inputs(conditioning.init(jax.random.key(0)), jnp.arange(2), obs, GOAL)
+    np.testing.assert_array_equal(inputs[:, :17], jnp.concatenate([obs, GOAL], axis=1))
+    assert inputs.shape == (2, conditioning.size)
+    return np.asarray(inputs[:, 17:])
+
+
+@pytest.fixture
+def angles(arms, rng) -> np.ndarray:
+    return rng.uniform(-1, 1, (2, 7)) * arms.hardware["joint_mask"]
+
+
+def end_effectors(arms: RobotPool, angles: np.ndarray) -> np.ndarray:
+    """By MuJoCo: [2, 3] m."""
+    positions = []
+    for row, model in enumerate(arms.models()):
+        data = mujoco.MjData(model)
+        data.qpos[:] = angles[row]
+        mujoco.mj_kinematics(model, data)
+        positions.append(data.site("ref_pt").xpos)
+    return np.asarray(positions)
+
+
+def test_every_encoding_is_as_long_as_documented(arms, angles):
+    assert {name: features(arms, name, angles).shape[1] for name in GOAL_CONDITIONINGS} == LENGTHS
+
+
+def test_the_controls_see_the_end_effector_and_nothing_else_of_the_robot(arms, angles):
+    positions = end_effectors(arms, angles)
+    np.testing.assert_allclose(features(arms, "none+end_effector", angles), positions, atol=1e-5)
+    offset = features(arms, "none+goal_offset", angles)
+    np.testing.assert_allclose(0.02 * np.sinh(offset), positions - GOAL, atol=1e-4)
+
+
+def test_chain_fk_holds_the_end_effector_its_offset_and_zeros_for_missing_joints(arms, angles):
+    values = features(arms, "chain_fk", angles)
+    positions = end_effectors(arms, angles)
+    np.testing.assert_allclose(values[:, 42:45], positions, atol=1e-5)
+    np.testing.assert_allclose(values[:, 54:], features(arms, "none+goal_offset", angles), atol=1e-5)
+    np.testing.assert_array_equal(values[0, [*range(15, 21), *range(36, 42)]], 0.0)
+    assert (values[1, 15:21] != 0.0).all()
