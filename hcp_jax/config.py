@@ -228,6 +228,7 @@ class DDPGConfig:
         relabel: HER's goals: `future`, `final` or `none`.
         future_k: relabelled goals for each original one.
         future_candidates: future states drawn for a relabelled goal, of which the nearest to the episode's own goal is taken.
+        stop_at_success: learn nothing from what an episode does after it reached its goal.
         actor_average: what a running mean of the actors keeps of itself at each iteration; that mean is what is evaluated
             (0: the actor itself).
         exploration_noise: standard deviation of the Gaussian added to actions.
@@ -253,6 +254,7 @@ class DDPGConfig:
     relabel: str = "future"
     future_k: int = 4
     future_candidates: int = 1
+    stop_at_success: bool = False
     actor_average: float = 0.0
     exploration_noise: float = 0.1
     exploration_correlation: float = 0.0

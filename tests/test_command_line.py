@@ -73,6 +73,11 @@ BAD_ARGUMENTS = {
         ["--config", REACHER, "--config.ddpg.buffer_episodes=100"],
         "ddpg.buffer_episodes=100: must hold",
     ),
+    "buffer larger than the memory": (
+        ["--config", REACHER, "--config.ddpg.buffer_episodes=1000000000", "--config.pool.robots_per_type=1"]
+        + ["--config.pool.heldout_per_type=1"],
+        "ddpg.buffer_episodes=1000000000: needs 19,",
+    ),
     "negative k": (["--config", REACHER, "--config.ddpg.future_k=-1"], "ddpg.future_k=-1: expected at least 0"),
     "hopper's v_h for an arm": (
         ["--config", REACHER, "--config.encoding=kinematics"],

@@ -210,13 +210,16 @@ class DDPG:
         keys = jax.random.split(key_steps, self.env.episode_length)
         (last, _), (obs, achieved_goal, transitions) = jax.lax.scan(step, (first, first_noise), keys)
         ended = jnp.cumsum(transitions.diverged, axis=0) > 0
+        is_over = ended
+        if self.config.stop_at_success:  # after the step that succeeds
+            is_over = ended | (jnp.cumsum(transitions.success, axis=0) - transitions.success > 0)
         episodes = EpisodeBatch(
             obs=jnp.swapaxes(jnp.concatenate([obs, last.obs[None]]), 0, 1),
             achieved_goal=jnp.swapaxes(jnp.concatenate([achieved_goal, last.achieved_goal[None]]), 0, 1),
             action=jnp.swapaxes(transitions.action, 0, 1),
             desired_goal=first.desired_goal,
             index=first.index,
-            length=jnp.sum(~ended, axis=0, dtype=jnp.int32),
+            length=jnp.sum(~is_over, axis=0, dtype=jnp.int32),
         )
         sums = {
             "iterations": 1.0,

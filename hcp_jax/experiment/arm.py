@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import os
 from collections.abc import Callable
 from typing import ClassVar
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from hcp_jax.algorithms.ddpg import DDPG, DDPGState
 from hcp_jax.algorithms.replay import replay_bytes
-from hcp_jax.config import ArmConfig, ArmPoolConfig, Config
+from hcp_jax.config import ArmConfig, ArmPoolConfig, Config, ConfigError
 from hcp_jax.envs.arm import HOLE, ArmTask
 from hcp_jax.envs.goal import GoalEnv
 from hcp_jax.envs.goal_episodes import GoalEpisodes, GoalEvaluator
@@ -121,8 +122,20 @@ def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:
         num_iterations,
         config.embedding.learning_rate,
     )
+    check_memory(config, replay_bytes(learner.buffer_shapes()))
     evaluator = make_evaluator(config, learner, make_env, heldout_pool, train_pool)
     return ArmExperiment(config, physics, train_pool, heldout_pool, learner, make_env, num_iterations, evaluator)
+
+
+def check_memory(config: Config, num_bytes: int) -> None:
+    """Raises ConfigError if a replay buffer of `num_bytes` does not fit the device that trains."""
+    stats = jax.devices()[0].memory_stats() or {}
+    memory = stats.get("bytes_limit") or os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if num_bytes > memory:
+        raise ConfigError(
+            f"ddpg.buffer_episodes={config.ddpg.buffer_episodes}: needs {num_bytes / 1e9:,.1f} GB, the device has "
+            f"{memory / 1e9:,.1f} GB: expected at most {config.ddpg.buffer_episodes * memory // num_bytes}"
+        )
 
 
 def make_heldout_arms(config: Config, types: tuple[str, ...], num_per_type: int) -> RobotPool:

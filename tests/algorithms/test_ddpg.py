@@ -122,6 +122,16 @@ def test_steps_after_a_divergence_are_not_stored_as_learnable_and_the_robot_is_n
     np.testing.assert_array_equal(state.diverged, [int((replay.episodes.index[:20] == 0).sum()), 0])
 
 
+def test_an_episode_may_end_with_the_step_that_reaches_its_goal():
+    learner = make(stop_at_success=True)
+    episodes = trained(learner, 20).replay.episodes
+    goal = jnp.broadcast_to(episodes.desired_goal[:, None], episodes.action.shape)
+    _, success = learner.env.compute_reward(episodes.achieved_goal[:, 1:], goal, episodes.action)
+    steps = jnp.where(jnp.any(success, axis=1), jnp.argmax(success, axis=1) + 1, learner.env.episode_length)
+    np.testing.assert_array_equal(episodes.length, steps)
+    assert 20 < int(jnp.sum(steps < learner.env.episode_length)) < 180
+
+
 def test_two_critics_value_a_step_no_higher_than_one():
     single, double = trained(make()), trained(make(double_critic=True))
     assert jax.tree.leaves(double.params["critic"])[0].shape[0] == 2
