@@ -18,9 +18,10 @@ from hcp_jax.hardware.pool import PoolError
 from hcp_jax.hardware.ranges import RangeError
 from hcp_jax.physics.base import PhysicsOverflowError
 from hcp_jax.training.checkpoint import CheckpointError
+from hcp_jax.training.loop import NonFiniteError
 from hcp_jax.training.run_folder import RunFolderError
 
-BAD_INPUT = 2
+BAD_INPUT, BROKEN = 2, 1
 _USER_ERRORS = (ConfigError, RangeError, RunFolderError, CheckpointError, PoolError)
 _OVERRIDE = re.compile(r"--config\.([^=\s]+)(=.*)?$", re.DOTALL)
 
@@ -37,15 +38,18 @@ class OneLineParser(argparse.ArgumentParser):
 
 @contextlib.contextmanager
 def user_errors_end_the_command() -> Iterator[None]:
-    """Bad input ends the process with one line on stderr and exit code 2; a physics overflow with exit code 1."""
+    """Bad input ends the process with one line on stderr and exit code 2; what broke on the way with one line and exit code 1."""
     try:
         yield
     except _USER_ERRORS as error:
         print(_one_line(error), file=sys.stderr)
         sys.exit(BAD_INPUT)
-    except PhysicsOverflowError as error:
+    except (PhysicsOverflowError, NonFiniteError) as error:
         print(_one_line(error), file=sys.stderr)
-        sys.exit(1)
+        sys.exit(BROKEN)
+    except OSError as error:
+        print(f"{_one_line(error)} (checkpoints that were finished before are kept)", file=sys.stderr)
+        sys.exit(BROKEN)
 
 
 def enable_compilation_cache() -> None:

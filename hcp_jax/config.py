@@ -331,6 +331,7 @@ class Config:
         eval_every: control steps between evaluations, which also write a checkpoint; rounded to whole iterations.
         eval_robots: hoppers of the training pool, and at most as many held-out ones, in an evaluation.
         keep_checkpoints: newest checkpoints kept beside the best one.
+        max_skipped_updates: updates in a row whose loss or gradient is not finite, and which are skipped, that end the run.
         init: run folder whose layers and observation statistics this run starts from; empty starts from scratch.
         init_layers: `hidden` (paper, section 5.2) or `all` of that run's layers.
     """
@@ -346,6 +347,7 @@ class Config:
     eval_every: int = 2_000_000
     eval_robots: int = 100
     keep_checkpoints: int = 3
+    max_skipped_updates: int = 100
     init: str = ""
     init_layers: str = "hidden"
     pool: PoolConfig | ArmPoolConfig = PoolConfig()
@@ -364,7 +366,7 @@ class Config:
             ("encoding", (*ENCODINGS, "embedding") if self.task == "hopper" else ARM_CONDITIONINGS),
         ):
             _require(getattr(self, field) in allowed, field, getattr(self, field), f"one of {', '.join(allowed)}")
-        for field in ("total_env_steps", "eval_every", "eval_robots", "keep_checkpoints"):
+        for field in ("total_env_steps", "eval_every", "eval_robots", "keep_checkpoints", "max_skipped_updates"):
             _require(getattr(self, field) >= 1, field, getattr(self, field), "at least 1")
         _require(self.seed >= 0, "seed", self.seed, "at least 0")
         _require(self.num_envs >= 0, "num_envs", self.num_envs, "at least 0")

@@ -19,6 +19,7 @@ import optax
 from brax.training.acme import running_statistics, specs
 from flax import struct
 
+from hcp_jax.algorithms.guard import Skipped, apply_update, init_skipped
 from hcp_jax.algorithms.her import relabel_goals
 from hcp_jax.algorithms.replay import EpisodeBatch, Replay, StepSample, add_episodes, episode_shapes, init_replay, sample_steps
 from hcp_jax.config import DDPGConfig
@@ -58,8 +59,8 @@ class DDPGState:
     """Everything that training carries from one iteration to the next.
 
     iteration: [] int32 iterations done; average_actor: running mean of the actors after each iteration, the policy that is
-    evaluated; statistics: of the networks' inputs; diverged: [N] int32 episodes that each robot lost
-    to non-finite physics; overflow: [] int32; sums: running sums of metrics since they were last read.
+    evaluated; statistics: of the networks' inputs; diverged: [N] int32 episodes that each robot lost to non-finite physics;
+    overflow: [] int32; skipped: updates that were not finite; sums: running sums of metrics since they were last read.
     """
 
     policy_fields: ClassVar = ("iteration", "params", "average_actor", "statistics")
@@ -74,6 +75,7 @@ class DDPGState:
     key: jax.Array
     diverged: jax.Array
     overflow: jax.Array
+    skipped: Skipped
     sums: dict[str, jax.Array]
 
 
@@ -152,6 +154,7 @@ class DDPG:
             key=key,
             diverged=jnp.zeros(self.env.num_robots, jnp.int32),
             overflow=jnp.int32(0),
+            skipped=init_skipped(self.env.num_robots),
             sums=zero_sums(),
         )
 
@@ -254,20 +257,21 @@ class DDPG:
         config = self.config
 
         def update(carry, key):
-            params, target_params, opt_state = carry
+            params, target_params, opt_state, skipped = carry
             key_sample, key_goals = jax.random.split(key)
             sample = sample_steps(state.replay, key_sample, config.batch_size)
             goal = relabel_goals(state.replay, sample, key_goals, config.relabel, config.future_k, config.future_candidates)
             grads, metrics = jax.grad(self._loss, has_aux=True)(params, target_params, state.statistics, sample, goal)
-            updates, opt_state = self._optimizer.update(grads, opt_state, params)
-            params: Any = optax.apply_updates(params, updates)
+            params, opt_state, metrics, skipped = apply_update(
+                self._optimizer, grads, metrics, params, opt_state, skipped, sample.index
+            )
             online = {name: params[name] for name in target_params}
             target_params = optax.incremental_update(online, target_params, self.config.tau)
-            return (params, target_params, opt_state), metrics
+            return (params, target_params, opt_state, skipped), metrics
 
         keys = jax.random.split(key, self.config.updates_per_iteration)
-        carry, metrics = jax.lax.scan(update, (state.params, state.target_params, state.opt_state), keys)
-        params, target_params, opt_state = carry
+        carry, metrics = jax.lax.scan(update, (state.params, state.target_params, state.opt_state, state.skipped), keys)
+        params, target_params, opt_state, skipped = carry
         sums = {name: state.sums[name] + jnp.sum(metrics[name]) for name in LOSS_METRICS}
         sums["updates"] = state.sums["updates"] + config.updates_per_iteration
         return state.replace(
@@ -275,6 +279,7 @@ class DDPG:
             target_params=target_params,
             average_actor=optax.incremental_update(params["actor"], state.average_actor, 1.0 - config.actor_average),
             opt_state=opt_state,
+            skipped=skipped,
             sums=state.sums | sums,
         )
 

@@ -22,6 +22,7 @@ import optax
 from brax.training.acme import running_statistics, specs
 from flax import struct
 
+from hcp_jax.algorithms.guard import Skipped, apply_update, init_skipped
 from hcp_jax.algorithms.identification import (
     forward_model_variables,
     prediction_loss,
@@ -71,7 +72,8 @@ class PPOState:
     iteration: [] int32 iterations done; reserve: before the identification's end the actor to go on with, after it the one
     that robots were identified under, None without identification; model_statistics: of [obs, change of obs], the forward
     model's units, which stand still after the identification; diverged: [N] int32 episodes that each robot lost to non-finite
-    physics; overflow: [] int32 worlds that ever overflowed; sums: running sums of metrics since they were last read.
+    physics; overflow: [] int32 worlds that ever overflowed; skipped: updates that were not finite; sums: running sums of metrics
+    since they were last read.
     """
 
     # What a policy needs, and fitting v_h of new robots to it.
@@ -87,6 +89,7 @@ class PPOState:
     key: jax.Array
     diverged: jax.Array
     overflow: jax.Array
+    skipped: Skipped
     sums: dict[str, jax.Array]
 
 
@@ -196,6 +199,7 @@ class PPO:
             key=key,
             diverged=jnp.zeros(self.env.num_robots, jnp.int32),
             overflow=jnp.int32(0),
+            skipped=init_skipped(self.env.num_robots),
             sums=zero_sums(),
         )
 
@@ -341,19 +345,22 @@ class PPO:
         num_samples = batch.obs.shape[0]
 
         def minibatch_step(carry, rows):
-            params, opt_state = carry
+            params, opt_state, skipped = carry
             minibatch = jax.tree.map(lambda x: x[rows], batch)
             grads, metrics = jax.grad(loss, has_aux=True)(params, minibatch, state)
-            updates, opt_state = self._optimizer.update(grads, opt_state, params)
-            return (optax.apply_updates(params, updates), opt_state), metrics
+            params, opt_state, metrics, skipped = apply_update(
+                self._optimizer, grads, metrics, params, opt_state, skipped, minibatch.index
+            )
+            return (params, opt_state, skipped), metrics
 
         def epoch(carry, key_epoch):
             rows = jax.random.permutation(key_epoch, num_samples)
             return jax.lax.scan(minibatch_step, carry, rows.reshape(self.config.num_minibatches, -1))
 
         keys = jax.random.split(key, self.config.num_epochs)
-        (params, opt_state), metrics = jax.lax.scan(epoch, (state.params, state.opt_state), keys)
-        return state.replace(params=params, opt_state=opt_state), jax.tree.map(jnp.mean, metrics)
+        carry, metrics = jax.lax.scan(epoch, (state.params, state.opt_state, state.skipped), keys)
+        params, opt_state, skipped = carry
+        return state.replace(params=params, opt_state=opt_state, skipped=skipped), jax.tree.map(jnp.mean, metrics)
 
     def _ppo_loss(self, params: Params, batch: Batch, state: PPOState) -> tuple[jax.Array, dict]:
         config = self.config

@@ -30,6 +30,11 @@ from hcp_jax.training.warm_start import load_init
 
 # Control steps between two progress lines: a few seconds of work.
 _CHUNK_ENV_STEPS = 250_000
+_NUM_NAMED = 3  # robots that an error names
+
+
+class NonFiniteError(RuntimeError):
+    """Losses or gradients were not finite in too many updates in a row."""
 
 
 @dataclasses.dataclass
@@ -58,6 +63,7 @@ def train(config: Config, folder: pathlib.Path, resume: bool = False) -> dict[st
     Raises:
         RunFolderError, CheckpointError: the folder cannot be used; nothing was written.
         PhysicsOverflowError: the physics dropped contacts or constraints.
+        NonFiniteError: losses or gradients stopped being finite; the newest checkpoint is from before.
     """
     if resume:
         run_folder.check_resumable(folder, config)
@@ -69,21 +75,27 @@ def train(config: Config, folder: pathlib.Path, resume: bool = False) -> dict[st
     state = run.init_state()
     if init is not None:
         state = init(run, state)
-    checkpoints = Checkpoints(folder / run_folder.CHECKPOINT_FOLDER, config.keep_checkpoints)
+    with run_folder.lock(folder):
+        if not resume:
+            run_folder.check_new(folder)  # another process may have come first
+            run_folder.write_start(folder, config, run.physics)
+        return _run(run, state, folder, resume)
+
+
+def _run(run: Experiment, state: TrainingState, folder: pathlib.Path, resume: bool) -> dict[str, float] | None:
+    """Trains from the newest checkpoint, if there is one to resume from, else from `state`."""
+    checkpoints = Checkpoints(folder / run_folder.CHECKPOINT_FOLDER, run.config.keep_checkpoints)
     iteration = 0
     if resume and checkpoints.iterations():
         iteration, state, skipped = checkpoints.restore(state)
         for line in skipped:
             print(line, flush=True)
-        print(f"resuming at {iteration * config.batch_size:,} steps", flush=True)
+        print(f"resuming at {iteration * run.config.batch_size:,} steps", flush=True)
     elif resume:
         print("the run ended before its first checkpoint: starting again", flush=True)
-    else:
-        run_folder.write_start(folder, config, run.physics)
     interrupt = Interrupt()
     interrupt.install()
-    loop = TrainingLoop(run, folder, checkpoints, iteration)
-    return loop.run(state, interrupt)
+    return TrainingLoop(run, folder, checkpoints, iteration).run(state, interrupt)
 
 
 class TrainingLoop:
@@ -125,12 +137,32 @@ class TrainingLoop:
         overflow = int(state.overflow)
         if overflow:
             raise PhysicsOverflowError(overflow)
+        if int(state.skipped.longest) >= self._run.config.max_skipped_updates:
+            raise NonFiniteError(self._describe_skipped(state))
+
+    def _describe_skipped(self, state: TrainingState) -> str:
+        """Where training broke, and the robots that were in most of the updates skipped."""
+        pool, counts = self._run.train_pool, np.asarray(state.skipped.robots)
+        robots = []
+        for row in np.argsort(-counts, kind="stable")[:_NUM_NAMED]:
+            scalars = {name: np.round(values[row], 4).tolist() for name, values in pool.hardware.items() if values.ndim == 2}
+            robots.append(f"robot {pool.robot_id[row]} in {counts[row]} of them ({scalars})")
+        newest = self._checkpoints.iterations()
+        kept = f"{newest[-1] * self._batch_size:,} steps" if newest else "none"
+        return (
+            f"{int(state.skipped.longest)} updates in a row had a loss or gradient that is not finite and were skipped, before "
+            f"{self._env_steps:,} steps; last checkpoint: {kept}; {'; '.join(robots)}"
+        )
 
     def _evaluate(self, state: TrainingState) -> tuple[TrainingState, dict[str, float]]:
         run = self._run
         evaluated, line = run.evaluate(state)
         diverged = np.asarray(state.diverged)
-        counts = {"diverged_episodes": int(diverged.sum()), "diverged_robots": int((diverged > 0).sum())}
+        counts = {
+            "diverged_episodes": int(diverged.sum()),
+            "diverged_robots": int((diverged > 0).sum()),
+            "skipped_updates": int(state.skipped.total),
+        }
         metrics = {"env_steps": self._env_steps, **evaluated, **run.learner_metrics(state), **counts}
         timing = {
             "env_steps": self._env_steps,

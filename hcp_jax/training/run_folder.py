@@ -1,5 +1,7 @@
 """The run folder: what is written at its start, and what is checked before anything is."""
 
+import contextlib
+import fcntl
 import importlib.metadata
 import json
 import os
@@ -7,6 +9,7 @@ import pathlib
 import platform
 import subprocess
 import sys
+from collections.abc import Iterator
 
 import jax
 
@@ -15,6 +18,7 @@ from hcp_jax.config import Config, ConfigError, from_dict, to_dict
 CONFIG_FILE = "config.json"
 ENVIRONMENT_FILE = "environment.json"
 CHECKPOINT_FOLDER = "checkpoints"
+LOCK_FILE = ".lock"
 # Fields that a resumed run may change.
 _CHANGEABLE = {"total_env_steps", "keep_checkpoints"}
 _PACKAGES = ("jax", "jaxlib", "mujoco", "mujoco-mjx", "warp-lang", "brax", "flax", "optax", "orbax-checkpoint", "numpy")
@@ -25,8 +29,8 @@ class RunFolderError(ValueError):
 
 
 def check_new(folder: pathlib.Path) -> None:
-    """Raises RunFolderError if `folder` holds anything."""
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    """Raises RunFolderError if `folder` holds anything but a lock."""
+    if folder.exists() and (not folder.is_dir() or any(path.name != LOCK_FILE for path in folder.iterdir())):
         raise RunFolderError(f"--out={folder}: already exists; choose another folder, or continue it with --resume")
 
 
@@ -37,6 +41,26 @@ def check_resumable(folder: pathlib.Path, config: Config) -> None:
     for name in new:
         if name not in _CHANGEABLE and old[name] != new[name]:
             raise RunFolderError(f"--resume: {folder} was started with {name}={old[name]!r}, not {new[name]!r}")
+
+
+@contextlib.contextmanager
+def lock(folder: pathlib.Path) -> Iterator[None]:
+    """Keeps other processes from writing into `folder`, which is made if it is missing. The system frees it when this one ends.
+
+    Raises:
+        RunFolderError: another process is writing there; nothing was changed.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / LOCK_FILE).open("a+") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            file.seek(0)
+            raise RunFolderError(f"--out={folder}: process {file.read().strip() or '?'} is training there") from error
+        file.truncate(0)
+        file.write(f"{os.getpid()}\n")
+        file.flush()
+        yield
 
 
 def read_config(folder: pathlib.Path) -> Config:
