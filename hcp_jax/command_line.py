@@ -38,7 +38,7 @@ class OneLineParser(argparse.ArgumentParser):
 
 @contextlib.contextmanager
 def user_errors_end_the_command() -> Iterator[None]:
-    """Bad input ends the process with one line on stderr and exit code 2; what broke on the way with one line and exit code 1."""
+    """Bad input ends the process with one line on stderr and exit code 2, what broke on the way with one and exit code 1."""
     try:
         yield
     except _USER_ERRORS as error:

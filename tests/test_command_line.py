@@ -44,6 +44,7 @@ def experiment(folder: pathlib.Path, body: str) -> str:
     return str(path)
 
 
+FEW_ROBOTS = ("--config.pool.robots_per_type=1", "--config.pool.heldout_per_type=1")
 BAD_ARGUMENTS = {
     "unknown config file": (["--config", "nowhere.py"], "nowhere.py: no such file"),
     "no config": ([], "--config"),
@@ -74,8 +75,7 @@ BAD_ARGUMENTS = {
         "ddpg.buffer_episodes=100: must hold",
     ),
     "buffer larger than the memory": (
-        ["--config", REACHER, "--config.ddpg.buffer_episodes=1000000000", "--config.pool.robots_per_type=1"]
-        + ["--config.pool.heldout_per_type=1"],
+        ["--config", REACHER, "--config.ddpg.buffer_episodes=1000000000", *FEW_ROBOTS],
         "ddpg.buffer_episodes=1000000000: needs 19,",
     ),
     "negative k": (["--config", REACHER, "--config.ddpg.future_k=-1"], "ddpg.future_k=-1: expected at least 0"),

@@ -72,8 +72,8 @@ class PPOState:
     iteration: [] int32 iterations done; reserve: before the identification's end the actor to go on with, after it the one
     that robots were identified under, None without identification; model_statistics: of [obs, change of obs], the forward
     model's units, which stand still after the identification; diverged: [N] int32 episodes that each robot lost to non-finite
-    physics; overflow: [] int32 worlds that ever overflowed; skipped: updates that were not finite; sums: running sums of metrics
-    since they were last read.
+    physics; overflow: [] int32 worlds that ever overflowed; skipped: updates that were not finite; sums: running sums of
+    metrics since they were last read.
     """
 
     # What a policy needs, and fitting v_h of new robots to it.
