@@ -10,7 +10,8 @@ import numpy as np
 from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
 from hcp_jax.hardware.pool import RobotPool
 
-NUM_STARTS, NUM_STEPS = 24, 60
+NUM_STARTS, NUM_FIRST_STARTS, NUM_STEPS = 24, 4, 60
+_BLOCK = 100
 _DAMPING = 1e-3
 MAX_TILT = np.deg2rad(10.0)  # of a peg in its hole
 _TILT_WEIGHT = 0.05  # [m/rad]
@@ -37,21 +38,40 @@ def solve_positions(
         upright: also ask for the z axis of the point of interest to stand upright.
         starts: angles to start from [N, S, 7] rad, of which the best end counts; by default `NUM_STARTS` random ones.
     """
-    hardware = {name: jnp.asarray(values, jnp.float32) for name, values in pool.hardware.items()}
+    if starts is None:
+        starts = _random_starts(pool, key)
+    hardware = {name: jnp.asarray(pool.hardware[name], jnp.float32) for name in ("chain_pos", "chain_quat", "joint_range")}
     rotation = quat_to_matrix(hardware["chain_quat"])
     low, high = jnp.moveaxis(hardware["joint_range"], -1, 0)
-    share = jax.random.uniform(key, (NUM_STARTS, *low.shape))
-    random_starts = jnp.swapaxes(low + share * (high - low), 0, 1)
-    solve = jax.jit(jax.vmap(functools.partial(_solve_arm, upright=upright)))
-    mask = hardware["joint_mask"]
-    starts = random_starts if starts is None else jnp.asarray(starts)
-    return Solution(*map(np.asarray, solve(hardware["chain_pos"], rotation, low, high, mask, jnp.asarray(goal), starts)))
+    mask = jnp.asarray(pool.hardware["joint_mask"], jnp.float32)
+    solution = _solve_arms(hardware["chain_pos"], rotation, low, high, mask, jnp.asarray(goal), jnp.asarray(starts), upright)
+    return Solution(*map(np.asarray, solution))
+
+
+def _random_starts(pool: RobotPool, key: jax.Array) -> np.ndarray:
+    """[N, NUM_STARTS, 7] rad within the joints' ranges."""
+    low, high = np.moveaxis(pool.hardware["joint_range"], -1, 0)[:, :, None]
+    return low + np.asarray(jax.random.uniform(key, (pool.num_robots, NUM_STARTS, low.shape[-1]))) * (high - low)
 
 
 def is_reachable(pool: RobotPool, goal: np.ndarray, within: float, key: jax.Array, upright: bool = False) -> np.ndarray:
     """Whether each arm can bring its point of interest `within` [m] of its goal [N, 3], and if asked upright: [N] bool."""
-    solution = solve_positions(pool, goal, key, upright)
-    return (solution.distance < within) & (solution.tilt < MAX_TILT)
+    starts = _random_starts(pool, key)
+    reachable = np.zeros(pool.num_robots, bool)
+    # Most arms get there from one of few starts; the others try the rest.
+    for tried in (slice(0, NUM_FIRST_STARTS), slice(NUM_FIRST_STARTS, NUM_STARTS)):
+        rows = np.flatnonzero(~reachable)
+        if len(rows):
+            padded = np.resize(rows, -(-len(rows) // _BLOCK) * _BLOCK)  # few shapes, so few compilations
+            solution = solve_positions(pool.subset(padded), goal[padded], key, upright, starts[padded, tried])
+            reachable[padded] |= (solution.distance < within) & (solution.tilt < MAX_TILT)
+    return reachable
+
+
+@functools.partial(jax.jit, static_argnames="upright")
+def _solve_arms(chain_pos, chain_rotation, low, high, mask, goal, starts, upright: bool):
+    solve = functools.partial(_solve_arm, upright=upright)
+    return jax.vmap(solve)(chain_pos, chain_rotation, low, high, mask, goal, starts)
 
 
 def _solve_arm(chain_pos, chain_rotation, low, high, mask, goal, starts, *, upright: bool):
