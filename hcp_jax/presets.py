@@ -58,7 +58,8 @@ def hopper_paper(name: str, encoding: str, **changes) -> Config:
 
 
 # 128 episodes, then 500 updates of 256 steps: a thirteenth of the paper's steps per episode. LayerNorm and whitened inputs
-# allow five times the step size.
+# allow five times the step size. What an arm does once it is there would be most of what is learned from: peg insertion is at
+# 33 % after 1.5 M steps without it, and was at 12 % with it.
 FAST_DDPG = DDPGConfig(
     preset="fast",
     layer_norm=True,
@@ -68,7 +69,8 @@ FAST_DDPG = DDPGConfig(
     learning_rate_decay=0.1,
     batch_size=256,
     updates_per_iteration=500,
-    actor_average=0.9,
+    stop_at_success=True,
+    actor_average=0.97,
 )
 # The peg: exploration that keeps its direction for some steps gets it to the hole, half of the goals stay the hole itself, and
 # those of hindsight are the states that came nearest to it.
@@ -86,8 +88,8 @@ FAST_NUM_ENVS = 128
 # Steps and evaluations of a training, by task. The peg is learned from a reverse curriculum: three episodes in ten start in
 # the hole or above it.
 ARM_SCHEDULES = {
-    "reacher": {"total_env_steps": 7_680_000, "eval_every": 256_000, "ddpg": FAST_DDPG},
-    "peg_insertion": {"total_env_steps": 20_480_000, "eval_every": 512_000, "ddpg": FAST_PEG_DDPG},
+    "reacher": {"total_env_steps": 5_120_000, "eval_every": 256_000, "ddpg": FAST_DDPG},
+    "peg_insertion": {"total_env_steps": 15_360_000, "eval_every": 512_000, "ddpg": FAST_PEG_DDPG},
 }
 APPROACH_STARTS = {"reacher": 0.0, "peg_insertion": 0.3}
 ARM_TYPES = tuple("ABCDEFGHI")
