@@ -17,6 +17,7 @@ CHANGES = {
         "actor_learning_rate": PAPER.actor_learning_rate,
         "critic_learning_rate": PAPER.critic_learning_rate,
     },
+    "without_stop_at_success": {"stop_at_success": PAPER.stop_at_success},
     "without_learning_rate_decay": {"learning_rate_decay": PAPER.learning_rate_decay},
     "with_the_papers_batch_size": {"batch_size": PAPER.batch_size},
 }

@@ -83,6 +83,7 @@ def print_table(record: dict) -> None:
             "success [%]": "success_mean",
             "std over trials": "success_std",
             "of reachable goals [%]": "reachable_success_mean",
+            "of arms without immovable joints [%]": "movable_success_mean",
         }
     columns |= {"episode length": "episode_length_mean"}
     table.add_column("robots")

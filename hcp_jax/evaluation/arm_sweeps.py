@@ -91,7 +91,8 @@ def evaluate_arms(
         episodes = evaluator(run.learner.policy(state), index, key_play)
         goals = np.asarray(episodes.desired_goal)
         reachable = is_reachable(pool.subset(index), goals, env_config.success_distance, key_goal, upright)
-        record["types"][name] = {"zero_shot": name not in pools.types} | summarise_type(episodes, reachable, trials)
+        stuck = immovable_joints(pool)[index].any(axis=1)
+        record["types"][name] = {"zero_shot": name not in pools.types} | summarise_type(episodes, reachable, stuck, trials)
         record["robots"] += [{"type": name} | row for row in robot_rows(pool, episodes, reachable)]
     return record
 
@@ -105,15 +106,20 @@ def split_types(pool: RobotPool, types: Sequence[str]) -> dict[str, RobotPool]:
     return {str(name): pool.subset(np.flatnonzero(names == name)) for name in types or dict.fromkeys(names)}
 
 
-def summarise_type(episodes: GoalEpisodes, reachable: np.ndarray, trials: int) -> dict:
-    """Success over trials, and over the goals that the arm can reach at all."""
+def summarise_type(episodes: GoalEpisodes, reachable: np.ndarray, stuck: np.ndarray, trials: int) -> dict:
+    """Success over trials, over the goals that the arm can reach at all, and over the arms that can move all their joints."""
+
+    def percent(chosen: np.ndarray) -> float | None:
+        return 100.0 * float(episodes.success[chosen].mean()) if chosen.any() else None
+
     means = 100.0 * episodes.success.reshape(trials, -1).mean(axis=1)
-    within = episodes.success[reachable]
     return {
         "success_mean": float(means.mean()),
         "success_std": float(means.std()),
-        "reachable_success_mean": 100.0 * float(within.mean()) if len(within) else None,
+        "reachable_success_mean": percent(reachable),
         "reachable_share": 100.0 * float(reachable.mean()),
+        "movable_success_mean": percent(~stuck),
+        "immovable_share": 100.0 * float(stuck.mean()),
         "final_distance_quantiles": {f"{q:g}": float(np.quantile(episodes.final_distance, q)) for q in QUANTILES},
         "episode_length_mean": float(episodes.episode_length.mean()),
     }

@@ -27,6 +27,13 @@ def test_success_over_reachable_goals_counts_the_reachable_ones_alone(record):
         assert row["reachable_share"] == 25.0 * len(reachable)
 
 
+def test_arms_with_an_immovable_joint_are_counted_and_left_out_of_the_others_success(record):
+    for name, row in record["types"].items():
+        movable = [robot["success"] for robot in record["robots"] if robot["type"] == name and not robot["immovable_joints"]]
+        assert row["movable_success_mean"] == (100.0 * np.mean(movable) if movable else None)
+        assert row["immovable_share"] == 100.0 - 25.0 * len(movable)
+
+
 def test_a_joint_is_immovable_where_friction_exceeds_its_torque_limit(record):
     for robot in record["robots"]:
         hardware = {name: np.asarray(values) for name, values in robot["hardware"].items()}
