@@ -228,6 +228,7 @@ class DDPGConfig:
         relabel: HER's goals: `future`, `final` or `none`.
         future_k: relabelled goals for each original one.
         future_candidates: future states drawn for a relabelled goal, of which the nearest to the episode's own goal is taken.
+        failing_share: of the training episodes, whose robots are drawn in proportion to how often they failed lately.
         stop_at_success: learn nothing from what an episode does after it reached its goal.
         actor_average: what a running mean of the actors keeps of itself at each iteration; that mean is what is evaluated
             (0: the actor itself).
@@ -254,6 +255,7 @@ class DDPGConfig:
     relabel: str = "future"
     future_k: int = 4
     future_candidates: int = 1
+    failing_share: float = 0.0
     stop_at_success: bool = False
     actor_average: float = 0.0
     exploration_noise: float = 0.1
@@ -272,7 +274,7 @@ class DDPGConfig:
             _require(_positive(getattr(self, name)), f"ddpg.{name}", getattr(self, name), "a number above 0")
         for name in ("learning_rate_decay", "critic_weight_decay", "exploration_noise"):
             _require(_at_least_zero(getattr(self, name)), f"ddpg.{name}", getattr(self, name), "a number of at least 0")
-        for name in ("gamma", "tau", "random_action_probability"):
+        for name in ("gamma", "tau", "random_action_probability", "failing_share"):
             _require(0.0 <= getattr(self, name) <= 1.0, f"ddpg.{name}", getattr(self, name), "a number in [0, 1]")
         for name in ("actor_average", "exploration_correlation"):
             _require(0.0 <= getattr(self, name) < 1.0, f"ddpg.{name}", getattr(self, name), "a number in [0, 1)")

@@ -59,8 +59,9 @@ class DDPGState:
     """Everything that training carries from one iteration to the next.
 
     iteration: [] int32 iterations done; average_actor: running mean of the actors after each iteration, the policy that is
-    evaluated; statistics: of the networks' inputs; diverged: [N] int32 episodes that each robot lost to non-finite physics;
-    overflow: [] int32; skipped: updates that were not finite; sums: running sums of metrics since they were last read.
+    evaluated; statistics: of the networks' inputs; failure: [N] running mean of each robot's failures; diverged: [N] int32
+    episodes that each robot lost to non-finite physics; overflow: [] int32; skipped: updates that were not finite; sums:
+    running sums of metrics since they were last read.
     """
 
     policy_fields: ClassVar = ("iteration", "params", "average_actor", "statistics")
@@ -73,12 +74,14 @@ class DDPGState:
     statistics: running_statistics.RunningStatisticsState
     replay: Replay
     key: jax.Array
+    failure: jax.Array
     diverged: jax.Array
     overflow: jax.Array
     skipped: Skipped
     sums: dict[str, jax.Array]
 
 
+FAILURE_STEP = 0.2  # of a robot's running mean of failures, per episode
 LOSS_METRICS = ("critic_loss", "actor_loss", "q")
 SUMS = (*LOSS_METRICS, "iterations", "updates", "episodes", "successes", "final_distance")
 
@@ -152,6 +155,7 @@ class DDPG:
             statistics=running_statistics.init_state(specs.Array((self.conditioning.size,), jnp.float32)),
             replay=init_replay(self.buffer_shapes()),
             key=key,
+            failure=jnp.ones(self.env.num_robots),
             diverged=jnp.zeros(self.env.num_robots, jnp.int32),
             overflow=jnp.int32(0),
             skipped=init_skipped(self.env.num_robots),
@@ -180,13 +184,15 @@ class DDPG:
 
     def _train_iteration(self, state: DDPGState) -> DDPGState:
         key, key_collect, key_update = jax.random.split(state.key, 3)
-        episodes, diverged, overflow, sums = self._collect(state, key_collect)
+        episodes, failed, diverged, overflow, sums = self._collect(state, key_collect)
+        change = FAILURE_STEP * (failed - state.failure[episodes.index])
         statistics = running_statistics.update(state.statistics, self._step_inputs(state.params["embedding"], episodes))
         state = state.replace(
             iteration=state.iteration + 1,
             key=key,
             statistics=statistics,
             replay=add_episodes(state.replay, episodes),
+            failure=state.failure.at[episodes.index].add(change),
             diverged=state.diverged.at[episodes.index].add(diverged.astype(jnp.int32)),
             overflow=state.overflow + overflow,
             sums=state.sums | {name: state.sums[name] + value for name, value in sums.items()},
@@ -194,10 +200,10 @@ class DDPG:
         is_warm = state.replay.num_added >= self.config.warmup_episodes
         return jax.lax.cond(is_warm, self._learn, lambda state, key: state, state, key_update)
 
-    def _collect(self, state: DDPGState, key: jax.Array) -> tuple[EpisodeBatch, jax.Array, jax.Array, dict]:
-        """Plays `num_envs` episodes with the exploring policy; also which diverged [B], overflows [] and metrics."""
+    def _collect(self, state: DDPGState, key: jax.Array) -> tuple[EpisodeBatch, jax.Array, jax.Array, jax.Array, dict]:
+        """Plays `num_envs` episodes with the exploring policy; also which failed and diverged [B], overflows [] and metrics."""
         key_robots, key_reset, key_noise, key_steps = jax.random.split(key, 4)
-        first = self.env.reset(key_reset, draw_robots(key_robots, self.env.num_robots, self.num_envs))
+        first = self.env.reset(key_reset, self._draw_robots(state, key_robots))
         correlation = self.config.exploration_correlation
 
         def step(carry: tuple[GoalState, jax.Array], key: jax.Array):
@@ -224,13 +230,23 @@ class DDPG:
             index=first.index,
             length=jnp.sum(~is_over, axis=0, dtype=jnp.int32),
         )
+        succeeded = jnp.any(transitions.success, axis=0).astype(jnp.float32)
         sums = {
             "iterations": 1.0,
             "episodes": float(self.num_envs),
-            "successes": jnp.sum(jnp.any(transitions.success, axis=0), dtype=jnp.float32),
+            "successes": jnp.sum(succeeded),
             "final_distance": jnp.sum(transitions.distance[-1]),
         }
-        return episodes, ended[-1], jnp.sum(transitions.overflow), sums
+        return episodes, 1.0 - succeeded, ended[-1], jnp.sum(transitions.overflow), sums
+
+    def _draw_robots(self, state: DDPGState, key: jax.Array) -> jax.Array:
+        """The iteration's robots: evenly, but for the share of those that fail. [B] int32."""
+        even = draw_robots(key, self.env.num_robots, self.num_envs)
+        if not self.config.failing_share:
+            return even
+        key_failing, key_choice = jax.random.split(jax.random.fold_in(key, 1))
+        failing = jax.random.categorical(key_failing, jnp.log(state.failure + 1e-3), shape=even.shape).astype(jnp.int32)
+        return jnp.where(jax.random.uniform(key_choice, even.shape) < self.config.failing_share, failing, even)
 
     def _explore(self, state: DDPGState, env_state: GoalState, noise: jax.Array, key: jax.Array) -> jax.Array:
         """The policy's action with standard Gaussian `noise` scaled, or a uniform one: always while the buffer warms up."""

@@ -132,6 +132,23 @@ def test_an_episode_may_end_with_the_step_that_reaches_its_goal():
     assert 20 < int(jnp.sum(steps < learner.env.episode_length)) < 180
 
 
+def test_robots_that_fail_are_drawn_more_often_as_far_as_asked():
+    learner = make((1.0,) * 20, failing_share=0.5)
+    state = trained(learner, 1).replace(failure=jnp.where(jnp.arange(20) == 3, 1.0, 0.0))
+    drawn = jnp.stack([learner._draw_robots(state, key) for key in jax.random.split(jax.random.key(1), 100)])
+    assert 0.4 < float((drawn == 3).mean()) < 0.6
+
+
+def test_a_robots_failures_are_averaged_over_its_episodes():
+    learner = make((1.0, 1.0), warmup_episodes=1000)
+    state = trained(learner, 1)
+    episodes = jax.tree.map(lambda leaf: leaf[:10], state.replay.episodes)
+    goal = jnp.broadcast_to(episodes.desired_goal[:, None], episodes.action.shape)
+    success = learner.env.compute_reward(episodes.achieved_goal[:, 1:], goal, episodes.action)[1].any(axis=1)
+    expected = [1.0 - 0.2 * float((success & (episodes.index == robot)).sum()) for robot in range(2)]
+    np.testing.assert_allclose(state.failure, expected, atol=1e-6)
+
+
 def test_two_critics_value_a_step_no_higher_than_one():
     single, double = trained(make()), trained(make(double_critic=True))
     assert jax.tree.leaves(double.params["critic"])[0].shape[0] == 2
