@@ -15,7 +15,7 @@ from hcp_jax.hardware.inverse_kinematics import is_reachable
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.physics.base import default_physics
 from hcp_jax.training import run_folder
-from hcp_jax.training.warm_start import load_state
+from hcp_jax.training.warm_start import load_policy
 
 QUANTILES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0)
 
@@ -61,7 +61,7 @@ def evaluate_arms(
             raise ConfigError(f"--types={name}: that arm holds a peg; it is of peg_insertion alone")
     physics = physics if physics != "auto" else config.physics
     run = make_arm_experiment(config, default_physics() if physics == "auto" else physics)
-    iteration, state = load_state(folder, run, best)
+    iteration, state = load_policy(folder, run, best)
     count, upright = trials * robots_per_trial, config.task == "peg_insertion"
     if pool_folder:
         pools_by_type = split_types(load_pool(pool_folder, run.train_pool), types)

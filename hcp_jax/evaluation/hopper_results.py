@@ -11,7 +11,7 @@ from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.summary import read_curve, read_run_commit, steps_to_reach, summarise_runs
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training.run_folder import read_config
-from hcp_jax.training.warm_start import load_state
+from hcp_jax.training.warm_start import load_policy
 
 LABEL = "return of one episode"
 
@@ -73,7 +73,7 @@ def write_finetune(folders: Sequence[pathlib.Path], out: pathlib.Path) -> str:
 def write_embedding(folder: pathlib.Path, out: pathlib.Path) -> str:
     """R^2 of the torso mass from the 2-D embedding, and its scatter plot."""
     run = make_experiment(read_config(folder))
-    iteration, state = load_state(folder, run)
+    iteration, state = load_policy(folder, run)
     embedding, mass = np.asarray(state.params["embedding"]), run.train_pool.hardware["body_mass"][:, 0]
     record = {
         "run": folder.name,

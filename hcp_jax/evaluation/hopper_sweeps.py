@@ -21,7 +21,7 @@ from hcp_jax.experiment.hopper import (
 )
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.training import run_folder
-from hcp_jax.training.warm_start import load_state
+from hcp_jax.training.warm_start import load_policy
 
 
 def evaluate_hoppers(
@@ -61,7 +61,7 @@ def evaluate_hoppers(
     config = run_folder.read_config(folder)
     run = make_experiment(config, physics)
     assert isinstance(run, HopperExperiment)
-    iteration, state = load_state(folder, run, best)
+    iteration, state = load_policy(folder, run, best)
     count = trials * robots_per_trial
     drawn = change_ranges(config, ranges).pool
     assert isinstance(drawn, PoolConfig)

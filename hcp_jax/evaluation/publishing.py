@@ -12,7 +12,7 @@ from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE
 from hcp_jax.training.policy_file import write_policy
 from hcp_jax.training.run_folder import CONFIG_FILE, ENVIRONMENT_FILE, read_config
-from hcp_jax.training.warm_start import load_state
+from hcp_jax.training.warm_start import load_policy
 
 
 def find_runs(runs: pathlib.Path) -> list[pathlib.Path]:
@@ -45,7 +45,7 @@ def copy_files(source: pathlib.Path, target: pathlib.Path, names: Sequence[str])
 def publish_policy(folder: pathlib.Path, target: pathlib.Path) -> None:
     """Writes the newest policy of a run, with its config and environment, to `target`."""
     copy_files(folder, target, (CONFIG_FILE, ENVIRONMENT_FILE))
-    write_policy(target, load_state(folder, make_experiment(read_config(folder)))[1])
+    write_policy(target, load_policy(folder, make_experiment(read_config(folder)))[1])
 
 
 def plot_groups(groups: Mapping[str, Sequence[pathlib.Path]], path: pathlib.Path, columns: Sequence[str], label: str) -> None:

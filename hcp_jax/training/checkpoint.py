@@ -54,14 +54,18 @@ class Checkpoints:
         return self._best.latest_step()
 
     def restore_best(self, template: TrainingState) -> tuple[int, TrainingState]:
-        """The checkpoint with the highest return on training robots. Raises CheckpointError if there is none."""
+        """The policy with the highest return or success, in `template`. Raises CheckpointError if there is none."""
         iteration = self.best()
         if iteration is None:
             raise CheckpointError(f"{self.folder}: holds no best checkpoint")
-        return iteration, self._read_checked(self._best, template, iteration)
+        return iteration, self._read_checked(self._best, template, iteration, policy_only=True)
 
-    def restore(self, template: TrainingState) -> tuple[int, TrainingState, list[str]]:
+    def restore(self, template: TrainingState, policy_only: bool = False) -> tuple[int, TrainingState, list[str]]:
         """Reads the newest checkpoint that can be read. Damaged ones are moved aside, unless this is read-only.
+
+        Args:
+            template: a state of the config's shapes.
+            policy_only: read `policy_fields` alone, which needs no memory for a replay buffer; the rest is the template's.
 
         Returns:
             its iteration, its state, and a line for each newer checkpoint that was damaged.
@@ -74,7 +78,7 @@ class Checkpoints:
         skipped = []
         for iteration in self.iterations()[::-1]:
             try:
-                return iteration, self._read_checked(self._newest, template, iteration), skipped
+                return iteration, self._read_checked(self._newest, template, iteration, policy_only), skipped
             except CheckpointError:
                 raise
             except Exception as error:  # orbax and tensorstore raise many kinds for damaged files
@@ -91,14 +95,24 @@ class Checkpoints:
                 (self.folder / "newest" / str(iteration)).rename(aside)
             self._newest.reload()
 
-    def _read_checked(self, manager: ocp.CheckpointManager, template: TrainingState, iteration: int) -> TrainingState:
+    def _read_checked(
+        self, manager: ocp.CheckpointManager, template: TrainingState, iteration: int, policy_only: bool
+    ) -> TrainingState:
         self._check_architecture(manager, template, iteration)
-        return self._read(manager, template, iteration)
+        return (self._read_policy if policy_only else self._read)(manager, template, iteration)
 
     def _read(self, manager: ocp.CheckpointManager, template: TrainingState, iteration: int) -> TrainingState:
         abstract = jax.tree.map(ocp.utils.to_shape_dtype_struct, template)
         restored = manager.restore(iteration, args=ocp.args.Composite(state=ocp.args.StandardRestore(abstract)))
         return restored.state
+
+    def _read_policy(self, manager: ocp.CheckpointManager, template: TrainingState, iteration: int) -> TrainingState:
+        fields = {name: getattr(template, name) for name in template.policy_fields}
+        abstract = jax.tree.map(ocp.utils.to_shape_dtype_struct, fields)
+        restore_args = ocp.checkpoint_utils.construct_restore_args(abstract)
+        arguments = ocp.args.PyTreeRestore(item=abstract, restore_args=restore_args, partial_restore=True)
+        with ocp.Checkpointer(ocp.PyTreeCheckpointHandler()) as reader:
+            return template.replace(**reader.restore(manager.directory / str(iteration) / "state", args=arguments))
 
     def _check_architecture(self, manager: ocp.CheckpointManager, template: TrainingState, iteration: int) -> None:
         metadata = manager.item_metadata(iteration).state

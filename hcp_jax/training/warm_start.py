@@ -18,10 +18,10 @@ from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
 from hcp_jax.training.policy_file import POLICY_FILE, read_policy
 
 
-def load_state(folder: pathlib.Path, run: Experiment, best: bool = False) -> tuple[int, Any]:
-    """The newest readable state of a run folder, or its best one, and its number of iterations.
+def load_policy(folder: pathlib.Path, run: Experiment, best: bool = False) -> tuple[int, Any]:
+    """An initial state with the newest readable policy of a run folder, or its best one, and its number of iterations.
 
-    A published policy (a folder with `policy.msgpack` instead of checkpoints) gives an initial state with that policy.
+    A folder may also be a published policy: one with `policy.msgpack` instead of checkpoints.
     """
     checkpoint_folder = folder / run_folder.CHECKPOINT_FOLDER
     if not checkpoint_folder.is_dir():
@@ -33,7 +33,7 @@ def load_state(folder: pathlib.Path, run: Experiment, best: bool = False) -> tup
     try:
         if best:
             return checkpoints.restore_best(run.init_state())
-        iteration, state, skipped = checkpoints.restore(run.init_state())
+        iteration, state, skipped = checkpoints.restore(run.init_state(), policy_only=True)
         for line in skipped:
             print(line, flush=True)
         return iteration, state
@@ -58,7 +58,7 @@ def load_init(config: Config) -> Callable[[Any, TrainingState], TrainingState]:
             raise CheckpointError(f"init={config.init}: another architecture: its {field} is {old!r}, the config's {new!r}")
     if bool(source_config.embedding.identify_steps) != bool(config.embedding.identify_steps):
         raise CheckpointError(f"init={config.init}: its v_h was learned in another way (embedding.identify_steps)")
-    source = load_state(folder, make_experiment(source_config))[1]
+    source = load_policy(folder, make_experiment(source_config))[1]
     start = _start_ppo if config.algorithm == "ppo" else _start_ddpg
     return lambda run, state: start(source, state, config.init_layers == "all")
 

@@ -13,8 +13,8 @@ import pytest
 
 from hcp_jax.config import to_dict
 from hcp_jax.experiment.build import make_experiment
+from hcp_jax.training.checkpoint import Checkpoints
 from hcp_jax.training.run_folder import read_config
-from hcp_jax.training.warm_start import load_state
 
 pytestmark = pytest.mark.slow
 
@@ -38,7 +38,8 @@ def command(experiment: pathlib.Path, out: pathlib.Path, *arguments: str) -> lis
 
 def final_arrays(folder: pathlib.Path):
     """The whole state, random keys as numbers."""
-    state = load_state(folder, make_experiment(read_config(folder)))[1]
+    template = make_experiment(read_config(folder)).init_state()
+    state = Checkpoints(folder / "checkpoints", read_only=True).restore(template)[1]
     return jax.tree.map(lambda leaf: jax.random.key_data(leaf) if is_key(leaf) else leaf, state)
 
 

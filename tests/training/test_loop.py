@@ -14,7 +14,7 @@ from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training import loop
 from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
 from hcp_jax.training.loop import Interrupt, TrainingLoop
-from hcp_jax.training.warm_start import load_init, load_state
+from hcp_jax.training.warm_start import load_init, load_policy
 
 
 def metrics(folder: pathlib.Path) -> list[dict]:
@@ -103,7 +103,7 @@ def warm(finished_run, tiny_config):
     """A warm-started experiment on new robots, its state at the start, and the state that it starts from."""
     config = dataclasses.replace(tiny_config, init=str(finished_run), pool=dataclasses.replace(tiny_config.pool, split="new"))
     run = make_experiment(config)
-    return run, load_init(config)(run, run.init_state()), load_state(finished_run, make_experiment(tiny_config))[1]
+    return run, load_init(config)(run, run.init_state()), load_policy(finished_run, make_experiment(tiny_config))[1]
 
 
 def test_a_warm_start_takes_hidden_layers_and_leaves_output_layers_and_embeddings_new(warm):
@@ -121,7 +121,7 @@ def test_a_warm_start_takes_hidden_layers_and_leaves_output_layers_and_embedding
 def test_a_warm_start_of_all_layers_takes_the_output_layers_too(finished_run, tiny_config):
     config = dataclasses.replace(tiny_config, init=str(finished_run), init_layers="all")
     run = make_experiment(config)
-    state, source = load_init(config)(run, run.init_state()), load_state(finished_run, make_experiment(tiny_config))[1]
+    state, source = load_init(config)(run, run.init_state()), load_policy(finished_run, make_experiment(tiny_config))[1]
     trained = get_actor(source.params, source.obs_statistics).network
     jax.tree.map(np.testing.assert_array_equal, state.reserve.network, trained)
 
@@ -153,14 +153,25 @@ def test_a_resumed_arm_run_ends_as_the_uninterrupted_one_replay_buffer_included(
     loop.train(tiny_arms, folder, resume=True)
     assert (folder / "metrics.csv").read_bytes() == (finished_arms / "metrics.csv").read_bytes()
     run = make_experiment(tiny_arms)
-    one, other = (load_state(path, run)[1].replay for path in (folder, finished_arms))
+    read = [Checkpoints(path / "checkpoints", read_only=True).restore(run.init_state()) for path in (folder, finished_arms)]
+    one, other = (state.replay for _, state, _ in read)
     jax.tree.map(np.testing.assert_array_equal, one, other)
+
+
+def test_a_policy_is_read_from_a_checkpoint_whatever_else_training_keeps(finished_arms, tiny_arms):
+    larger = dataclasses.replace(tiny_arms, ddpg=dataclasses.replace(tiny_arms.ddpg, buffer_episodes=50))
+    run = make_experiment(larger)
+    whole = Checkpoints(finished_arms / "checkpoints", read_only=True).restore(make_experiment(tiny_arms).init_state())[1]
+    _, state = load_policy(finished_arms, run)
+    for name in state.policy_fields:
+        jax.tree.map(np.testing.assert_array_equal, getattr(state, name), getattr(whole, name))
+    assert state.replay.capacity == 50
 
 
 def test_arms_start_from_the_layers_of_another_run(finished_arms, tiny_arms):
     config = dataclasses.replace(tiny_arms, init=str(finished_arms))
     run = make_experiment(config)
-    state, source = load_init(config)(run, run.init_state()), load_state(finished_arms, run)[1]
+    state, source = load_init(config)(run, run.init_state()), load_policy(finished_arms, run)[1]
     actor, old = (params["actor"]["params"] for params in (state.params, source.params))
     np.testing.assert_array_equal(actor["hidden_0"]["kernel"], old["hidden_0"]["kernel"])
     assert not np.array_equal(actor["output"]["kernel"], old["output"]["kernel"])
