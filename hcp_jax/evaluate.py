@@ -86,7 +86,7 @@ def print_table(record: dict) -> None:
             "of arms without immovable joints [%]": "movable_success_mean",
         }
     columns |= {"episode length": "episode_length_mean"}
-    table.add_column("robots")
+    table.add_column("robots", no_wrap=True)
     for column in columns:
         table.add_column(column, justify="right")
     for name, values in rows.items():

@@ -58,8 +58,8 @@ def hopper_paper(name: str, encoding: str, **changes) -> Config:
 
 
 # 128 episodes, then 500 updates of 256 steps: a thirteenth of the paper's steps per episode. LayerNorm and whitened inputs
-# allow five times the step size. What an arm does once it is there would be most of what is learned from: peg insertion is at
-# 33 % after 1.5 M steps without it, and was at 12 % with it.
+# allow five times the step size. What an arm does once it is there would be most of what is learned from, so that is left out:
+# the reacher explores with 81 % success after 1.0 M steps where it had 70 % (seed 0).
 FAST_DDPG = DDPGConfig(
     preset="fast",
     layer_norm=True,
@@ -73,13 +73,15 @@ FAST_DDPG = DDPGConfig(
     actor_average=0.97,
 )
 # The peg: exploration that keeps its direction for some steps gets it to the hole, half of the goals stay the hole itself, and
-# those of hindsight are the states that came nearest to it.
+# those of hindsight are the states that came nearest to it. Leaving out what follows a success made no difference here.
 FAST_PEG_DDPG = dataclasses.replace(
     FAST_DDPG,
     actor_learning_rate=1.5e-4,
     buffer_episodes=10_000,
     future_k=1,
     future_candidates=4,
+    stop_at_success=False,
+    actor_average=0.9,
     exploration_noise=0.2,
     exploration_correlation=0.9,
     random_action_probability=0.2,
@@ -89,7 +91,7 @@ FAST_NUM_ENVS = 128
 # the hole or above it.
 ARM_SCHEDULES = {
     "reacher": {"total_env_steps": 5_120_000, "eval_every": 256_000, "ddpg": FAST_DDPG},
-    "peg_insertion": {"total_env_steps": 15_360_000, "eval_every": 512_000, "ddpg": FAST_PEG_DDPG},
+    "peg_insertion": {"total_env_steps": 20_480_000, "eval_every": 512_000, "ddpg": FAST_PEG_DDPG},
 }
 APPROACH_STARTS = {"reacher": 0.0, "peg_insertion": 0.3}
 ARM_TYPES = tuple("ABCDEFGHI")
