@@ -65,7 +65,7 @@ class Checkpoints:
 
         Args:
             template: a state of the config's shapes.
-            policy_only: read `policy_fields` alone, which needs no memory for a replay buffer; the rest is the template's.
+            policy_only: read `policy_fields` alone, whatever else was saved; the rest is the template's.
 
         Returns:
             its iteration, its state, and a line for each newer checkpoint that was damaged.
