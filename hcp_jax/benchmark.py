@@ -1,7 +1,8 @@
-"""`python -m hcp_jax.benchmark physics|learner [--config FILE] [--batches 1 128 1120 8960] [--rows native] [--json FILE]`"""
+"""`python -m hcp_jax.benchmark physics|learner|train|scale [--config FILE] [--rows NAME ...] [--json FILE]`"""
 
 import argparse
 import pathlib
+from collections.abc import Iterable, Iterator
 
 import jax
 from rich.console import Console
@@ -10,9 +11,13 @@ from rich.table import Table
 from hcp_jax import command_line, presets
 from hcp_jax.benchmarks.learner import benchmark_learner
 from hcp_jax.benchmarks.physics import ROWS, benchmark_physics
-from hcp_jax.config import ConfigError
+from hcp_jax.benchmarks.scale import benchmark_scale
+from hcp_jax.benchmarks.training import TRAINING_ROWS, benchmark_training, time_to_success
+from hcp_jax.config import Config, ConfigError
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.training.run_folder import describe_environment
+
+SUBJECTS = ("physics", "learner", "train", "scale")
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -21,46 +26,70 @@ def main(arguments: list[str] | None = None) -> None:
         description="Measures speed, side by side in one run.",
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
-    parser.add_argument("subject", choices=["physics", "learner"])
+    parser.add_argument("subject", choices=SUBJECTS)
     parser.add_argument("--config", help="experiment that is timed; default: the reacher of Exp. I")
     parser.add_argument(
         "--batches", type=int, nargs="+", default=[1, 128, 1120, 8960], help="of physics: numbers of environments"
     )
-    parser.add_argument("--rows", nargs="+", choices=ROWS, default=list(ROWS), help="of physics")
+    parser.add_argument("--sizes", type=int, nargs="+", default=[10, 100, 1000, 10000], help="of scale: numbers of robots")
+    parser.add_argument("--rows", nargs="+", choices=(*ROWS, *TRAINING_ROWS), help="of physics and train; default: all")
+    parser.add_argument("--to-success", type=float, help="of train: wall time until this share [%%] succeeds instead")
+    parser.add_argument("--limit", type=float, default=3600.0, help="of --to-success: seconds after which a row is given up")
     parser.add_argument("--seconds", type=float, default=1.0, help="shortest time of one measurement")
     parser.add_argument("--json", type=pathlib.Path, help="file to write the rows to")
     options, overrides = parser.parse_known_args(arguments)
     with command_line.user_errors_end_the_command():
-        if min(options.batches) < 1:
-            raise ConfigError(f"--batches={min(options.batches)}: expected at least 1")
+        for name in ("batches", "sizes"):
+            if min(getattr(options, name)) < 1:
+                raise ConfigError(f"--{name}={min(getattr(options, name))}: expected at least 1")
         if options.config:
             config = command_line.load_config(options.config, overrides)
         else:
             config = command_line.apply_overrides(presets.arm("reacher", "reacher", "chain_fk", left_out="H"), overrides)
+        if options.to_success is not None and config.task == "hopper":
+            raise ConfigError("--to-success: the hopper has no success: expected a reacher or peg_insertion")
         command_line.enable_compilation_cache()
-        if options.subject == "learner":
-            rows = benchmark_learner(config, options.seconds)
-            print_durations(config.name, rows)
-        else:
-            rows = []
-            for row in benchmark_physics(config, options.batches, options.rows, options.seconds):
-                rows.append(row)
-                speed = f"{row['control_steps_per_second']:>13,.0f} control steps/s"
-                print(f"{row['name']:>13} {row['num_envs']:>7,} environments {speed}", flush=True)
+        rows = []
+        for row in measure(options, config):
+            rows.append(row)
+            print("  ".join(f"{name} {value:,}" if isinstance(value, (int, float)) else str(value) for name, value in row.items()))
+        if options.subject == "physics":
             print_speeds(config.name, rows)
+        else:
+            print_rows(config.name, rows)
     if options.json:
         write_json(options.json, {"environment": describe_environment(config.physics), "rows": rows})
 
 
-def print_durations(title: str, rows: list[dict]) -> None:
-    """What a training iteration and its parts take."""
-    table = Table(title=f"{title}: {rows[0]['num_envs']:,} environments, {jax.default_backend()}")
-    for column in ("row", "milliseconds", "control steps/s", "replay buffer"):
-        table.add_column(column, justify="left" if column == "row" else "right")
+def measure(options: argparse.Namespace, config: Config) -> Iterable[dict]:
+    """The rows of the chosen subject, as they come."""
+    if options.subject == "physics":
+        return benchmark_physics(config, options.batches, options.rows or list(ROWS), options.seconds)
+    if options.subject == "learner":
+        return benchmark_learner(config, options.seconds)
+    if options.subject == "scale":
+        return benchmark_scale(config, options.sizes, options.seconds)
+    rows = options.rows or list(TRAINING_ROWS)
+    if options.to_success is None:
+        return benchmark_training(config, rows, options.seconds)
+    return times_to_success(options, config, rows)
+
+
+def times_to_success(options: argparse.Namespace, config: Config, rows: list[str]) -> Iterator[dict]:
+    for name in rows:
+        if name in ("hcp_jax", "sb3-her"):
+            yield time_to_success(config, name, options.to_success, options.limit)
+
+
+def print_rows(title: str, rows: list[dict]) -> None:
+    """A table with a column for everything that any row has."""
+    table = Table(title=f"{title}, {jax.default_backend()}")
+    columns = list(dict.fromkeys(name for row in rows for name in row if name != "task"))
+    for column in columns:
+        table.add_column(column.replace("_", " "), justify="left" if column == "name" else "right")
     for row in rows:
-        speed, size = row.get("control_steps_per_second"), row.get("replay_bytes")
-        cells = (f"{speed:,.0f}" if speed else "", f"{size / 1e6:,.0f} MB" if size else "")
-        table.add_row(row["name"], f"{1e3 * row['seconds']:,.1f}", *cells)
+        cells = (row.get(column, "") for column in columns)
+        table.add_row(*(f"{cell:,}" if isinstance(cell, (int, float)) else str(cell) for cell in cells))
     Console().print(table)
 
 

@@ -14,7 +14,7 @@ from hcp_jax.physics.base import INTEGRATORS, PHYSICS
 
 TASKS = ("hopper", "reacher", "peg_insertion")
 ALGORITHM_OF = {"hopper": "ppo", "reacher": "ddpg", "peg_insertion": "ddpg"}
-ARM_CONDITIONINGS = (*ARM_ENCODINGS, "chain_fk", "none+end_effector", "none+goal_offset", "embedding")
+ARM_CONDITIONINGS = (*ARM_ENCODINGS, "chain_fk", "chain_fk+jacobian", "none+end_effector", "none+goal_offset", "embedding")
 INIT_LAYERS = ("hidden", "all")
 RELABEL_STRATEGIES = ("future", "final", "none")
 
@@ -220,6 +220,7 @@ class DDPGConfig:
         learning_rate_decay: of all steps: their factor at the end of the run, reached linearly.
         critic_weight_decay: L2 penalty on the critic's kernels.
         gamma: discount per control step.
+        n_step: steps whose rewards are summed before the target network's value (paper: 1).
         tau: step of the target networks towards the networks, per update.
         batch_size: steps per update.
         buffer_episodes: capacity of the replay buffer (paper: 1e6 steps, 5000 episodes of 200).
@@ -247,6 +248,7 @@ class DDPGConfig:
     learning_rate_decay: float = 1.0
     critic_weight_decay: float = 1e-3
     gamma: float = 0.99
+    n_step: int = 1
     tau: float = 0.01
     batch_size: int = 128
     buffer_episodes: int = 5_000
@@ -266,7 +268,7 @@ class DDPGConfig:
     double_critic: bool = False
 
     def __post_init__(self):
-        for name in ("batch_size", "buffer_episodes", "updates_per_iteration", "future_candidates"):
+        for name in ("batch_size", "buffer_episodes", "updates_per_iteration", "future_candidates", "n_step"):
             _require(getattr(self, name) >= 1, f"ddpg.{name}", getattr(self, name), "at least 1")
         for name in ("warmup_episodes", "future_k"):
             _require(getattr(self, name) >= 0, f"ddpg.{name}", getattr(self, name), "at least 0")
@@ -329,7 +331,8 @@ class Config:
         num_envs: parallel environments; 0 stands for the number of training robots.
         physics: `auto`, `mjx-warp`, `mjx-jax` or `native`.
         encoding: v_h. Hopper: `none`, `kinematics`, `kinematics+dynamics`, `random` or `embedding`; arms: `none`, `chain`,
-            `chain_fk`, `dynamics`, `chain+dynamics`, `random`, `embedding`, `none+end_effector` or `none+goal_offset`.
+            `chain_fk`, `chain_fk+jacobian`, `dynamics`, `chain+dynamics`, `random`, `embedding`, `none+end_effector` or
+            `none+goal_offset`.
         eval_every: control steps between evaluations, which also write a checkpoint; rounded to whole iterations.
         eval_robots: hoppers of the training pool, and at most as many held-out ones, in an evaluation.
         keep_checkpoints: newest checkpoints kept beside the best one.

@@ -5,7 +5,7 @@ train(state, n):                         one jitted call, buffers donated
     collect                              one episode in each of num_envs worlds, in lockstep
     add_episodes                         whole, with the robot's index instead of its v_h
     for each of updates_per_iteration:   draw steps, relabel goals, reward them
-                                         critic towards r + gamma (1 - success) Q', actor up the critic
+                                         critic towards the n-step return and Q' unless it succeeds, actor up the critic
                                          targets follow
     the mean of the actors, which is evaluated, follows
 """
@@ -23,6 +23,7 @@ from hcp_jax.algorithms.guard import Skipped, apply_update, init_skipped
 from hcp_jax.algorithms.her import relabel_goals
 from hcp_jax.algorithms.replay import EpisodeBatch, Replay, StepSample, add_episodes, episode_shapes, init_replay, sample_steps
 from hcp_jax.config import DDPGConfig
+from hcp_jax.devices import split_rows
 from hcp_jax.envs.goal import GoalState, GoalTransition
 from hcp_jax.policies.networks import Critic, DeterministicActor
 
@@ -203,7 +204,7 @@ class DDPG:
     def _collect(self, state: DDPGState, key: jax.Array) -> tuple[EpisodeBatch, jax.Array, jax.Array, jax.Array, dict]:
         """Plays `num_envs` episodes with the exploring policy; also which failed and diverged [B], overflows [] and metrics."""
         key_robots, key_reset, key_noise, key_steps = jax.random.split(key, 4)
-        first = self.env.reset(key_reset, self._draw_robots(state, key_robots))
+        first = split_rows(self.env.reset(key_reset, self._draw_robots(state, key_robots)))
         correlation = self.config.exploration_correlation
 
         def step(carry: tuple[GoalState, jax.Array], key: jax.Array):
@@ -213,7 +214,7 @@ class DDPG:
             noise = correlation * noise + math.sqrt(1.0 - correlation**2) * fresh
             action = self._explore(state, env_state, noise, key_action)
             next_state, transition = self.env.step(env_state, action)
-            return (next_state, noise), (env_state.obs, env_state.achieved_goal, transition)
+            return (split_rows(next_state), noise), (env_state.obs, env_state.achieved_goal, transition)
 
         first_noise = jax.random.normal(key_noise, (self.num_envs, self.env.action_size))
         keys = jax.random.split(key_steps, self.env.episode_length)
@@ -275,8 +276,9 @@ class DDPG:
         def update(carry, key):
             params, target_params, opt_state, skipped = carry
             key_sample, key_goals = jax.random.split(key)
-            sample = sample_steps(state.replay, key_sample, config.batch_size)
+            sample = sample_steps(state.replay, key_sample, config.batch_size, config.n_step)
             goal = relabel_goals(state.replay, sample, key_goals, config.relabel, config.future_k, config.future_candidates)
+            sample, goal = split_rows((sample, goal))
             grads, metrics = jax.grad(self._loss, has_aux=True)(params, target_params, state.statistics, sample, goal)
             params, opt_state, metrics, skipped = apply_update(
                 self._optimizer, grads, metrics, params, opt_state, skipped, sample.index
@@ -305,7 +307,8 @@ class DDPG:
         The actor's reaches it through the action alone, or v_h would drift to wherever the critic promises much.
         """
         frozen = jax.lax.stop_gradient(params)
-        reward, success = self.env.compute_reward(sample.achieved_goal, goal, sample.action)
+        reward, success = self.env.compute_reward(sample.achieved_goal, goal[:, None], sample.action)
+        reward, discount = sum_rewards(reward, success, sample.num_steps, self.config.gamma)
 
         def inputs(embedding, obs):
             return self.normalize(self.conditioning.inputs(embedding, sample.index, obs, goal), statistics)
@@ -313,9 +316,9 @@ class DDPG:
         next_inputs = inputs(frozen["embedding"], sample.next_obs)
         next_action = self._act(target_params["actor"], next_inputs)
         next_value = jnp.min(self._values(target_params["critic"], next_inputs, next_action), axis=0)
-        target = reward + self.config.gamma * jnp.where(success, 0.0, next_value)
+        target = reward + discount * next_value
         now = inputs(params["embedding"], sample.obs)
-        values = self._values(params["critic"], now, sample.action)
+        values = self._values(params["critic"], now, sample.action[:, 0])
         weight = sample.valid / jnp.maximum(jnp.sum(sample.valid), 1.0)
         critic_loss = jnp.sum(jnp.square(values - target) * weight)
         action = self._act(params["actor"], now)
@@ -332,6 +335,27 @@ class DDPG:
         """Action values of each critic: [C, B]."""
         apply: Any = self.critic.apply
         return jax.vmap(apply, in_axes=(0, None, None))(critic, inputs, action)
+
+
+def sum_rewards(
+    reward: jax.Array, success: jax.Array, num_steps: jax.Array, gamma: float
+) -> tuple[jax.Array, jax.Array]:
+    """The discounted rewards of runs of K steps until the first success, and what the value after them counts for.
+
+    Args:
+        reward, success: [N, K] of each step.
+        num_steps: [N] of the K steps that count.
+        gamma: discount per step.
+
+    Returns:
+        returns [N] and discounts [N] of the value of the state after `num_steps` steps, 0 after a success.
+    """
+    step = jnp.arange(reward.shape[1])
+    success = success & (step < num_steps[:, None])
+    is_before_success = jnp.cumsum(success, axis=1) - success == 0
+    counts = is_before_success & (step < num_steps[:, None])
+    discount = jnp.where(jnp.any(success, axis=1), 0.0, gamma ** num_steps.astype(reward.dtype))
+    return jnp.sum(jnp.where(counts, gamma**step * reward, 0.0), axis=1), discount
 
 
 def draw_robots(key: jax.Array, num_robots: int, num_envs: int) -> jax.Array:

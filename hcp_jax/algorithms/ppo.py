@@ -30,6 +30,7 @@ from hcp_jax.algorithms.identification import (
 )
 from hcp_jax.algorithms.returns import compute_gae
 from hcp_jax.config import EmbeddingConfig, PPOConfig
+from hcp_jax.devices import split_rows
 from hcp_jax.envs.base import EnvState, Transition
 from hcp_jax.policies.conditioning import Conditioning
 from hcp_jax.policies.distribution import gaussian_entropy, gaussian_log_prob, sample_gaussian
@@ -298,9 +299,9 @@ class PPO:
             action = sample_gaussian(mean, log_std, key_action)
             log_prob = gaussian_log_prob(mean, log_std, action)
             env_state, transition = self.env.step(env_state, action)
-            return env_state, (transition, log_prob, action)
+            return split_rows(env_state), (transition, log_prob, action)
 
-        return jax.lax.scan(step, state.env_state, jax.random.split(key, self.config.unroll_length))
+        return jax.lax.scan(step, split_rows(state.env_state), jax.random.split(key, self.config.unroll_length))
 
     def _make_batch(self, state: PPOState, transitions: Transition, log_prob, action) -> tuple[Batch, dict]:
         config = self.config
@@ -346,7 +347,7 @@ class PPO:
 
         def minibatch_step(carry, rows):
             params, opt_state, skipped = carry
-            minibatch = jax.tree.map(lambda x: x[rows], batch)
+            minibatch = split_rows(jax.tree.map(lambda x: x[rows], batch))
             grads, metrics = jax.grad(loss, has_aux=True)(params, minibatch, state)
             params, opt_state, metrics, skipped = apply_update(
                 self._optimizer, grads, metrics, params, opt_state, skipped, minibatch.index

@@ -44,11 +44,17 @@ class Replay:
 
 @struct.dataclass
 class StepSample:
-    """N steps, each of an episode drawn uniformly: row [N] of the buffer, step [N]; valid: [N] bool, False for an episode that
-    has nothing to learn from. The rest as in `EpisodeBatch`, [N, ...]; achieved_goal is that of the state stepped to."""
+    """N runs of up to K steps, each of an episode drawn uniformly.
+
+    row: [N] of the buffer; step: [N] the first of the run; num_steps: [N] int32, K or as many as the episode has left; valid: [N]
+    bool, False for an episode that has nothing to learn from; obs: [N, O] before the run, next_obs: after it; action: [N, K, A]
+    and achieved_goal: [N, K, G], of the states stepped to, of which those from `num_steps` on mean nothing. The rest as in
+    `EpisodeBatch`.
+    """
 
     row: jax.Array
     step: jax.Array
+    num_steps: jax.Array
     valid: jax.Array
     obs: jax.Array
     action: jax.Array
@@ -94,21 +100,24 @@ def add_episodes(replay: Replay, episodes: EpisodeBatch) -> Replay:
     return Replay(stored, replay.num_added + num_new)
 
 
-def sample_steps(replay: Replay, key: jax.Array, num_samples: int) -> StepSample:
-    """Draws steps uniformly from the episodes held, which must not be none."""
+def sample_steps(replay: Replay, key: jax.Array, num_samples: int, max_steps: int = 1) -> StepSample:
+    """Draws first steps uniformly from the episodes held, which must not be none, with the up to `max_steps` - 1 after each."""
     key_row, key_step = jax.random.split(key)
     episodes = replay.episodes
     row = jax.random.randint(key_row, (num_samples,), 0, jnp.maximum(replay.size, 1))
     length = episodes.length[row]
     step = sample_below(key_step, jnp.maximum(length, 1))
+    num_steps = jnp.clip(length - step, 1, max_steps)
+    run = jnp.minimum(step[:, None] + jnp.arange(max_steps), episodes.action.shape[1] - 1)
     return StepSample(
         row=row,
         step=step,
+        num_steps=num_steps,
         valid=length > 0,
         obs=episodes.obs[row, step],
-        action=episodes.action[row, step],
-        next_obs=episodes.obs[row, step + 1],
-        achieved_goal=episodes.achieved_goal[row, step + 1],
+        action=episodes.action[row[:, None], run],
+        next_obs=episodes.obs[row, step + num_steps],
+        achieved_goal=episodes.achieved_goal[row[:, None], run + 1],
         desired_goal=episodes.desired_goal[row],
         index=episodes.index[row],
     )

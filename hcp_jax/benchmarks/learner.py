@@ -3,8 +3,9 @@
 | row | what is timed |
 |---|---|
 | `iteration` | collecting and learning, as `train` does |
-| `collect` | of DDPG: the iteration's episodes, with one update |
-| `update` | of DDPG: one update of all networks, sampling and relabelling included |
+| `collect` | the iteration's control steps, with as little learning as the learner allows: one update of DDPG, one epoch of PPO |
+| `update` | one update of all networks: drawing and relabelling of DDPG and the optimiser included |
+| `matmul` | the matrix products of such an update alone: its bound |
 """
 
 import dataclasses
@@ -14,12 +15,16 @@ import jax
 import jax.numpy as jnp
 
 from hcp_jax.algorithms.ddpg import DDPG
+from hcp_jax.algorithms.ppo import PPO
 from hcp_jax.algorithms.replay import replay_bytes
+from hcp_jax.benchmarks.matmuls import Products, count_products, make_bare_products, total_flops
 from hcp_jax.benchmarks.physics import time_steps
 from hcp_jax.config import Config
 from hcp_jax.experiment.arm import ArmExperiment
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.experiment.hopper import HopperExperiment
+
+Run = ArmExperiment | HopperExperiment
 
 
 def benchmark_learner(config: Config, seconds: float) -> list[dict]:
@@ -30,39 +35,57 @@ def benchmark_learner(config: Config, seconds: float) -> list[dict]:
         seconds: shortest time of one measurement; the median of three counts.
 
     Returns:
-        Rows with name, task, num_envs, seconds (of one iteration or update), control_steps_per_second (of collecting rows), and
-        replay_bytes of DDPG.
+        Rows with name, task, num_envs, seconds (of one iteration or update), control_steps_per_second (of collecting rows),
+        flops and flops_per_second (of `update` and `matmul`, matrix products counted) and replay_bytes of DDPG.
     """
     run = make_experiment(config)
     assert isinstance(run, (ArmExperiment, HopperExperiment))
-    common = {"task": config.task, "num_envs": config.resolved_num_envs}
+    common: dict = {"task": config.task, "num_envs": config.resolved_num_envs}
+    if isinstance(run, ArmExperiment):
+        common["replay_bytes"] = replay_bytes(run.learner.buffer_shapes())
+        passes, updates_per_pass, batch_size = config.ddpg.updates_per_iteration, 1, config.ddpg.batch_size
+    else:
+        passes, updates_per_pass = config.ppo.num_epochs, config.ppo.num_minibatches
+        batch_size = config.batch_size // updates_per_pass
+    num_timed = max(2, passes)
+    collect, learn = (time_iteration(*with_passes(run, number), seconds) for number in (1, num_timed))
+    each_pass = (learn - collect) / (num_timed - 1)
+    one, two = (count_products(*with_passes(run, number), jnp.int32(1)) for number in (1, 2))
+    products: Products = two - one
+    flops, update = total_flops(products) / updates_per_pass, each_pass / updates_per_pass
+    bare = 1.0 / time_steps(make_bare_products(products), seconds)[0] / updates_per_pass
 
     def collecting_row(name: str, duration: float) -> dict:
         speed = round(config.batch_size / duration, 1)
         return {"name": name, **common, "seconds": round(duration, 4), "control_steps_per_second": speed}
 
-    if isinstance(run, HopperExperiment):
-        return [collecting_row("iteration", time_iteration(run.learner.train, run.init_state(), seconds))]
-    num_updates = config.ddpg.updates_per_iteration
-    num_timed = max(2, num_updates)
-    collect, learn = (time_with_updates(run, number, seconds) for number in (1, num_timed))
-    update = (learn - collect) / (num_timed - 1)
-    rows = [
-        collecting_row("iteration", collect + (num_updates - 1) * update),
+    def learning_row(name: str, duration: float) -> dict:
+        speeds = {"seconds": round(duration, 6), "flops": round(flops), "flops_per_second": round(flops / duration)}
+        return {"name": name, **common, "batch_size": batch_size, **speeds}
+
+    return [
+        collecting_row("iteration", collect + (passes - 1) * each_pass),
         collecting_row("collect", collect),
-        {"name": "update", **common, "seconds": round(update, 6), "batch_size": config.ddpg.batch_size},
+        learning_row("update", update),
+        learning_row("matmul", bare),
     ]
-    return [row | {"replay_bytes": replay_bytes(run.learner.buffer_shapes())} for row in rows]
 
 
-def time_with_updates(run: ArmExperiment, num_updates: int, seconds: float) -> float:
-    """Seconds of an iteration with `num_updates`, without a warm-up."""
-    config = dataclasses.replace(run.config.ddpg, updates_per_iteration=num_updates, warmup_episodes=0)
-    learner = run.learner
-    learner = DDPG(
-        learner.env, learner.conditioning, config, learner.num_envs, run.num_iterations, run.config.embedding.learning_rate
-    )
-    return time_iteration(learner.train, learner.init(jax.random.key(run.config.seed)), seconds)
+def with_passes(run: Run, number: int) -> tuple[Callable, object]:
+    """`train` and a fresh state of the run's learner, with `number` updates (DDPG) or epochs (PPO) and without a warm-up."""
+    learner, config = run.learner, run.config
+    if isinstance(learner, DDPG):
+        changed = dataclasses.replace(config.ddpg, updates_per_iteration=number, warmup_episodes=0)
+        changed_learner = DDPG(
+            learner.env, learner.conditioning, changed, learner.num_envs, run.num_iterations, config.embedding.learning_rate
+        )
+    else:
+        changed = dataclasses.replace(config.ppo, num_epochs=number)
+        embedding = dataclasses.replace(config.embedding, identify_steps=0)
+        changed_learner = PPO(
+            learner.env, learner.conditioning, changed, embedding, learner.num_envs, run.num_iterations
+        )
+    return changed_learner.train, changed_learner.init(jax.random.key(config.seed))
 
 
 def time_iteration(train: Callable, state, seconds: float) -> float:

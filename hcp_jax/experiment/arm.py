@@ -12,6 +12,7 @@ import numpy as np
 from hcp_jax.algorithms.ddpg import DDPG, DDPGState
 from hcp_jax.algorithms.replay import replay_bytes
 from hcp_jax.config import ArmConfig, ArmPoolConfig, Config, ConfigError
+from hcp_jax.devices import replicate
 from hcp_jax.envs.arm import HOLE, ArmTask
 from hcp_jax.envs.goal import GoalEnv
 from hcp_jax.envs.goal_episodes import GoalEpisodes, GoalEvaluator
@@ -39,8 +40,11 @@ class ArmExperiment:
     evaluator: GoalEvaluator
     best_metric: ClassVar[str] = "train_types_success"
 
+    def robot_inputs(self, pool: RobotPool) -> Callable[[jax.Array, jax.Array], jax.Array]:
+        return make_goal_conditioning(self.config, pool, self.train_pool).robot_inputs
+
     def init_state(self) -> DDPGState:
-        return self.learner.init(jax.random.fold_in(jax.random.key(self.config.seed), TRAIN))
+        return replicate(self.learner.init(jax.random.fold_in(jax.random.key(self.config.seed), TRAIN)))
 
     def introduce(self, iteration: int) -> list[str]:
         """Lines to say before training goes on."""

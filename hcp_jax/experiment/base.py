@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Any, ClassVar, Protocol
 
+import jax
+
 from hcp_jax.config import Config
 from hcp_jax.hardware.pool import RobotPool
 
@@ -35,9 +37,17 @@ class Experiment(Protocol):
     @property
     def train_pool(self) -> RobotPool: ...
     @property
+    def heldout_pool(self) -> RobotPool: ...
+    @property
+    def make_env(self) -> Callable[..., Any]: ...  # of a pool
+    @property
     def num_iterations(self) -> int: ...
     @property
     def learner(self) -> Learner: ...
+    def robot_inputs(self, pool: RobotPool) -> Callable[[jax.Array, jax.Array], jax.Array]:
+        """What an agent sees of robots at index [B] of `pool` and of their obs [B, O], but for goals: [B, K]."""
+        ...
+
     def init_state(self) -> TrainingState: ...
     def introduce(self, iteration: int) -> list[str]: ...
     def evaluate(self, state: TrainingState) -> tuple[dict[str, float | None], str]: ...

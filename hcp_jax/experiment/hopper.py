@@ -11,6 +11,7 @@ import numpy as np
 
 from hcp_jax.algorithms.ppo import PPO, Params, PPOState, get_actor, put_actor
 from hcp_jax.config import Config, HopperConfig, PoolConfig
+from hcp_jax.devices import replicate
 from hcp_jax.envs.base import PoolEnv
 from hcp_jax.envs.episodes import Episodes, Evaluator
 from hcp_jax.envs.hopper import Hopper
@@ -46,8 +47,12 @@ class HopperExperiment:
         """Robots of each kind in an evaluation."""
         return min(self.config.eval_robots, self.train_pool.num_robots, self.heldout_pool.num_robots)
 
+    def robot_inputs(self, pool: RobotPool) -> Callable[[jax.Array, jax.Array], jax.Array]:
+        table = jnp.asarray(encode(pool, self.config.encoding, self.train_pool))
+        return lambda index, obs: jnp.concatenate([obs, table[index]], axis=-1)
+
     def init_state(self) -> PPOState:
-        return self.ppo.init(jax.random.fold_in(jax.random.key(self.config.seed), TRAIN))
+        return replicate(self.ppo.init(jax.random.fold_in(jax.random.key(self.config.seed), TRAIN)))
 
     def introduce(self, iteration: int) -> list[str]:
         """Lines to say before training goes on from `iteration`."""

@@ -5,8 +5,10 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from jax.sharding import PartitionSpec
 from mujoco import mjx
 
+from hcp_jax.devices import ROWS, get_mesh, is_divisible
 from hcp_jax.hardware.pool import MEAN_INERTIA, RobotPool
 from hcp_jax.physics.base import PhysicsState
 from hcp_jax.physics.native import MJ_INTEGRATORS
@@ -58,6 +60,20 @@ class MjxPhysics:
         self._max_constraints = max_constraints
 
     def step(
+        self, robots: RobotPool, state: PhysicsState, ctrl: jax.Array, num_substeps: int
+    ) -> tuple[PhysicsState, jax.Array]:
+        step_rows = functools.partial(self._step_rows, num_substeps=num_substeps)
+        if not is_divisible(ctrl.shape[0]):
+            return step_rows(robots, state, ctrl)
+
+        def step_own_rows(robots: RobotPool, state: PhysicsState, ctrl: jax.Array) -> tuple[PhysicsState, jax.Array]:
+            state, overflow = step_rows(robots, state, ctrl)
+            return state, jax.lax.psum(overflow, ROWS[0])
+
+        specs = {"in_specs": ROWS, "out_specs": (ROWS, PartitionSpec())}
+        return jax.shard_map(step_own_rows, mesh=get_mesh(), check_vma=False, **specs)(robots, state, ctrl)
+
+    def _step_rows(
         self, robots: RobotPool, state: PhysicsState, ctrl: jax.Array, num_substeps: int
     ) -> tuple[PhysicsState, jax.Array]:
         num_worlds = ctrl.shape[0]

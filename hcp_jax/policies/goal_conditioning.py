@@ -4,6 +4,7 @@
 |---|---|---|
 | those of `hcp_jax.hardware.arm_encodings` | as there | a constant of the robot |
 | `chain_fk` | 57 | what `chain` says at the observed joint angles, as the released code feeds it: positions and axes of the joints, position and rotation of the end effector in the world; and its offset from the goal |
+| `chain_fk+jacobian` | 109 | `chain_fk`, and how the joints move the end effector: the velocity of the end effector and of its z axis per rad/s of each joint, the end effector's velocity, and how fast each joint takes it towards the goal |
 | `embedding` | its size | learned with the policy (HCP-I) |
 | `none+end_effector` | 3 | no v_h, but the end effector's position: a control |
 | `none+goal_offset` | 3 | no v_h, but the end effector's offset from the goal: a control |
@@ -20,9 +21,8 @@ from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.policies.conditioning import Embedding
 
-POSE_FEATURES = {"chain_fk": 57, "none+end_effector": 3, "none+goal_offset": 3}
+POSE_FEATURES = {"chain_fk": 57, "chain_fk+jacobian": 109, "none+end_effector": 3, "none+goal_offset": 3}
 GOAL_CONDITIONINGS = (*ARM_ENCODINGS, *POSE_FEATURES, "embedding")
-NUM_JOINTS = 7
 OFFSET_SCALE = 0.02  # [m]
 
 
@@ -61,24 +61,45 @@ class GoalConditioning:
     def inputs(self, embedding: jax.Array | None, index: jax.Array, obs: jax.Array, goal: jax.Array) -> jax.Array:
         """The networks' input for robots at `index` [B], obs [B, 14], goal [B, 3]: [B, size]."""
         v_h = self._table[index] if embedding is None else embedding[index]
-        return jnp.concatenate([obs, goal, v_h, *self._pose_features(index, obs[..., :NUM_JOINTS], goal)], axis=-1)
+        features = self._features(index, obs, goal)
+        return jnp.concatenate([obs, goal, v_h, *features["robot"], *features["goal"]], axis=-1)
 
-    def _pose_features(self, index: jax.Array, angles: jax.Array, goal: jax.Array) -> list[jax.Array]:
+    def robot_inputs(self, index: jax.Array, obs: jax.Array) -> jax.Array:
+        """What `inputs` has that no goal has a part in, the observation first: [B, ...]. For agents that relabel goals themselves."""
+        if self.is_learned:
+            raise ValueError("a learned v_h is part of the learner's params")
+        features = self._features(index, obs, jnp.zeros((*index.shape, 3)))
+        return jnp.concatenate([obs, self._table[index], *features["robot"]], axis=-1)
+
+    def _features(self, index: jax.Array, obs: jax.Array, goal: jax.Array) -> dict[str, list[jax.Array]]:
+        """The encoding's features [B, ...] of the robot's pose, and those of the pose and the goal."""
         if self.encoding not in POSE_FEATURES:
-            return []
+            return {"robot": [], "goal": []}
+        angles, velocities = jnp.split(obs, 2, axis=-1)
         positions, rotations = joint_poses(self._chain_pos[index], self._chain_rotation[index], angles)
         end_effector = positions[..., -1, :]
+        offset = scale_offset(end_effector - goal)
         if self.encoding == "none+end_effector":
-            return [end_effector]
+            return {"robot": [end_effector], "goal": []}
         if self.encoding == "none+goal_offset":
-            return [scale_offset(end_effector - goal)]
+            return {"robot": [], "goal": [offset]}
         mask = self._joint_mask[index][..., None]
+        anchors, axes = positions[..., :-1, :] * mask, rotations[..., :-1, :, 2] * mask
+        robot, towards = [anchors, axes, end_effector, rotations[..., -1, :, :]], [offset]
+        if self.encoding == "chain_fk+jacobian":
+            jacobian = jnp.cross(axes, end_effector[..., None, :] - anchors)
+            turns = jnp.cross(axes, rotations[..., -1, None, :, 2])
+            robot += [jacobian, turns, jnp.einsum("...ij,...i->...j", jacobian, velocities)]
+            towards += [jnp.einsum("...ij,...j->...i", jacobian, soft_direction(goal - end_effector))]
         flat = (*angles.shape[:-1], -1)
-        joints = [positions[..., :-1, :] * mask, rotations[..., :-1, :, 2] * mask]
-        tip = [end_effector, rotations[..., -1, :, :], scale_offset(end_effector - goal)]
-        return [part.reshape(flat) for part in joints + tip]
+        return {"robot": [part.reshape(flat) for part in robot], "goal": towards}
 
 
 def scale_offset(offset: jax.Array) -> jax.Array:
     """An offset in m, linear within `OFFSET_SCALE` and logarithmic beyond it."""
     return jnp.arcsinh(offset / OFFSET_SCALE)
+
+
+def soft_direction(offset: jax.Array) -> jax.Array:
+    """An offset in m, of length 1 far beyond `OFFSET_SCALE` and linear within it."""
+    return offset / jnp.sqrt(jnp.sum(jnp.square(offset), axis=-1, keepdims=True) + OFFSET_SCALE**2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from goal_probes import PlaneEnv, PlaneInputs
 
-from hcp_jax.algorithms.ddpg import DDPG, DDPGState, draw_robots, mark_kernels
+from hcp_jax.algorithms.ddpg import DDPG, DDPGState, draw_robots, mark_kernels, sum_rewards
 from hcp_jax.algorithms.replay import sample_steps
 from hcp_jax.config import ConfigError, DDPGConfig
 
@@ -78,7 +78,8 @@ def test_the_value_of_a_success_is_its_reward_and_a_failure_is_discounted_for_ev
     state = learner.init(jax.random.key(0))
     replay = trained(learner, 3).replay
     sample = sample_steps(replay, jax.random.key(1), 64)
-    hit, miss = sample.achieved_goal, jnp.full_like(sample.achieved_goal, 9.0)
+    hit = sample.achieved_goal[:, 0]
+    miss = jnp.full_like(hit, 9.0)
     params, optimiser, target = state.params, state.opt_state, state.target_params
 
     @jax.jit
@@ -92,10 +93,20 @@ def test_the_value_of_a_success_is_its_reward_and_a_failure_is_discounted_for_ev
     for _ in range(600):
         params, optimiser, target = update(params, optimiser, target, jnp.where(jnp.arange(64)[:, None] < 32, hit, miss))
     inputs = learner.conditioning.inputs(None, sample.index, sample.obs, jnp.where(jnp.arange(64)[:, None] < 32, hit, miss))
-    values = learner._values(params["critic"], inputs, sample.action)[0]
-    cost = 0.05 * jnp.sum(jnp.square(sample.action), axis=-1)
+    values = learner._values(params["critic"], inputs, sample.action[:, 0])[0]
+    cost = 0.05 * jnp.sum(jnp.square(sample.action[:, 0]), axis=-1)
     np.testing.assert_allclose(values[:32], 1.0 - cost[:32], atol=0.3)
     assert float(values[32:].mean()) < -7.0, "-1 in every step, gamma 0.9: -10 and the actions' cost"
+
+
+@pytest.mark.parametrize(
+    ("successes", "num_steps", "expected"),
+    [((), 3, (-1.75, 0.125)), ((), 2, (-1.5, 0.25)), ((1,), 3, (-0.5, 0.0)), ((2,), 2, (-1.5, 0.25)), ((0, 1), 3, (1.0, 0.0))],
+)
+def test_rewards_are_summed_to_the_first_success_or_the_last_step_that_counts(successes, num_steps, expected):
+    success = jnp.isin(jnp.arange(3), jnp.asarray(successes, jnp.int32))[None]
+    result = sum_rewards(jnp.where(success, 1.0, -1.0), success, jnp.array([num_steps]), gamma=0.5)
+    np.testing.assert_allclose(jnp.concatenate(result), expected)
 
 
 def test_the_same_seed_gives_the_same_result_in_one_call_or_two():

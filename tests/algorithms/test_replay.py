@@ -43,9 +43,9 @@ def test_episodes_stay_whole_and_the_oldest_go_first_when_the_buffer_wraps_aroun
     sample = sample_steps(replay, key, 500)
     code = 100 * sample.index + sample.step
     np.testing.assert_array_equal(sample.obs[:, 0], code)
-    np.testing.assert_array_equal(sample.action[:, 0], code)
+    np.testing.assert_array_equal(sample.action[:, 0, 0], code)
     np.testing.assert_array_equal(sample.next_obs[:, 1], code + 1)
-    np.testing.assert_array_equal(sample.achieved_goal[:, 2], code + 1)
+    np.testing.assert_array_equal(sample.achieved_goal[:, 0, 2], code + 1)
     assert len(np.unique(code)) == CAPACITY * LENGTH, "every step of every episode is drawn"
 
 
@@ -59,6 +59,18 @@ def test_steps_after_an_episodes_length_are_never_learned_from(key):
     sample = sample_steps(replay, key, 500)
     assert set(sample.step[sample.index < 3].tolist()) == {0, 1}
     np.testing.assert_array_equal(sample.valid, sample.index != 3)
+
+
+def test_runs_of_steps_stay_in_their_episode_and_end_with_it(key):
+    replay = filled(coded_episodes(0, 5, length=3))
+    sample = sample_steps(replay, key, 500, max_steps=4)
+    np.testing.assert_array_equal(sample.num_steps, 3 - sample.step)
+    first, last = 100 * sample.index + sample.step, 100 * sample.index + 3
+    np.testing.assert_array_equal(sample.next_obs[:, 1], last)
+    for ahead in range(3):
+        counts = np.asarray(sample.num_steps) > ahead
+        np.testing.assert_array_equal(sample.action[counts, ahead, 0], first[counts] + ahead)
+        np.testing.assert_array_equal(sample.achieved_goal[counts, ahead, 2], first[counts] + ahead + 1)
 
 
 def test_more_episodes_than_the_buffer_holds_are_refused():

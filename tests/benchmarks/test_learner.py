@@ -6,27 +6,30 @@ from hcp_jax import benchmark
 
 
 @pytest.mark.parametrize(
-    ("experiment", "rows"),
+    ("experiment", "sizes"),
     [
         (
             "presets.arm('a', 'reacher', 'chain_fk', num_envs=4, pool=ArmPoolConfig(('I',), (), 2))",
-            ["iteration", "collect", "update"],
+            ["--config.ddpg.updates_per_iteration=20", "--config.env.episode_length=10", "--config.ddpg.buffer_episodes=8"],
         ),
-        ("presets.hopper('a', 'kinematics', pool=PoolConfig(num_robots=4))", ["iteration"]),
+        (
+            "presets.hopper('a', 'kinematics', num_envs=8, pool=PoolConfig(num_robots=4))",
+            ["--config.ppo.unroll_length=8", "--config.ppo.num_minibatches=4"],
+        ),
     ],
 )
-def test_an_iteration_and_its_parts_are_timed(experiment, rows, tmp_path):
+def test_an_iteration_and_its_parts_are_timed(experiment, sizes, tmp_path):
     (tmp_path / "experiment.py").write_text(
         "from hcp_jax import presets\nfrom hcp_jax.config import ArmPoolConfig, PoolConfig\n"
         f"def get_config():\n    return {experiment}\n"
     )
     arguments = ["--config", str(tmp_path / "experiment.py"), "--seconds", "0.01", "--json", str(tmp_path / "out.json")]
-    sizes = ["--config.ddpg.updates_per_iteration=20", "--config.env.episode_length=10", "--config.ddpg.buffer_episodes=8"]
-    benchmark.main(["learner", *arguments, *(sizes if len(rows) > 1 else ())])
+    benchmark.main(["learner", *arguments, *sizes])
     timed = {row["name"]: row for row in json.loads((tmp_path / "out.json").read_text())["rows"]}
-    assert list(timed) == rows
+    assert list(timed) == ["iteration", "collect", "update", "matmul"]
     assert all(row["seconds"] > 0 for row in timed.values())
-    if len(rows) > 1:
+    assert timed["update"]["flops"] == timed["matmul"]["flops"] > 0
+    if "ddpg" in sizes[0]:
         assert timed["collect"]["seconds"] + 19 * timed["update"]["seconds"] == pytest.approx(
             timed["iteration"]["seconds"], rel=0.1
         )

@@ -1,0 +1,73 @@
+"""On 2 and 4 devices training comes out as on one, and each robot is stepped once. Each count is a process of its own."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+SCRIPT = """
+import json, sys
+import jax, jax.numpy as jnp, numpy as np
+from hcp_jax import presets
+from hcp_jax.config import ArmConfig, ArmPoolConfig, DDPGConfig, EmbeddingConfig, HopperConfig, PoolConfig, PPOConfig
+from hcp_jax.devices import get_mesh
+from hcp_jax.experiment.build import make_experiment
+
+HOPPER = presets.hopper(
+    "a", "embedding", num_envs=8, total_env_steps=512,
+    pool=PoolConfig(num_robots=8, num_heldout=4), env=HopperConfig(episode_length=24, integrator="euler"),
+    ppo=PPOConfig(unroll_length=8, num_minibatches=2, num_epochs=2, hidden_sizes=(8, 8), normalize_observation=True),
+    embedding=EmbeddingConfig(size=3, identify_steps=0, fit_steps=0),
+)
+ARMS = presets.arm(
+    "a", "reacher", "chain_fk", num_envs=8, total_env_steps=640,
+    pool=ArmPoolConfig(("A", "I"), (), 4, 2), env=ArmConfig(episode_length=10),
+    ddpg=DDPGConfig(hidden_sizes=(8, 8), batch_size=16, updates_per_iteration=5, buffer_episodes=16, warmup_episodes=8, n_step=3),
+)
+results = {"devices": get_mesh().size}
+for name, config, physics in (("hopper", HOPPER, "native"), ("arms", ARMS, "native"), ("mjx", HOPPER, "mjx-jax")):
+    run = make_experiment(config, physics)
+    stepped = []
+    if physics == "native":
+        engine = run.learner.env.physics
+        host_step = engine._host_step
+        engine._host_step = lambda n, ids, *rest: (stepped.append(len(ids)), host_step(n, ids, *rest))[1]
+    state = run.learner.train(run.init_state(), jnp.int32(1 if name == "mjx" else 3))
+    if name == "arms":
+        results["batch_devices"] = len(state.replay.episodes.obs.sharding.device_set)
+    else:
+        shards = state.env_state.obs.addressable_shards
+        results["shards"] = [shard.data.shape[0] for shard in shards]
+    leaves = [np.asarray(leaf, np.float64).ravel() for leaf in jax.tree.leaves(state.params)]
+    results[name] = np.concatenate(leaves).tolist()
+    results[name + "_stepped"] = stepped  # worlds of each call
+json.dump(results, sys.stdout)
+"""
+
+
+def train_on(num_devices: int) -> dict:
+    flags = {"XLA_FLAGS": f"--xla_force_host_platform_device_count={num_devices}", "JAX_PLATFORMS": "cpu"}
+    done = subprocess.run([sys.executable, "-c", SCRIPT], env=os.environ | flags, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def on_one() -> dict:
+    return train_on(1)
+
+
+@pytest.mark.parametrize("num_devices", [2, 4])
+def test_training_on_several_devices_comes_out_as_on_one(num_devices, on_one):
+    on_many = train_on(num_devices)
+    assert (on_one["devices"], on_many["devices"]) == (1, num_devices)
+    assert on_many["shards"] == [8 // num_devices] * num_devices
+    assert on_many["batch_devices"] == num_devices
+    for name in ("hopper", "arms", "mjx"):
+        np.testing.assert_allclose(on_many[name], on_one[name], atol=2e-4, err_msg=name)
+    for name in ("hopper", "arms"):
+        assert set(on_one[f"{name}_stepped"]) == {8}
+        assert on_many[f"{name}_stepped"] == on_one[f"{name}_stepped"]
