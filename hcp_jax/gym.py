@@ -1,8 +1,8 @@
-"""Our environments for agents that are not ours, as Gymnasium's `VectorEnv` and `Env`. Needs the extra: `pip install hcp-jax[gymnasium]`.
+"""Our environments for agents that are not ours, as Gymnasium's `VectorEnv` and `Env`.
 
     from hcp_jax import gym, presets
     worlds = gym.make_vector_env(presets.arm("mine", "reacher", "chain_fk", left_out="H"), num_envs=128)
-"""  # noqa: E501
+"""
 
 from hcp_jax.config import Config, ConfigError
 from hcp_jax.envs.base import PoolEnv

@@ -1,12 +1,16 @@
-"""`python -m hcp_jax.sweep experiments/LIST.py --seeds 3 [--out runs/LIST] [--summary FILE] [--config.FIELD=VALUE ...]`"""
+"""`python -m hcp_jax.sweep experiments/LIST.py --seeds 3 [--out runs/LIST] [--ray ADDRESS] [--config.FIELD=VALUE ...]`"""
 
 import argparse
 import dataclasses
+import functools
 import pathlib
+import sys
 
 from hcp_jax import command_line
+from hcp_jax.config import Config, from_dict
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.summary import summarise_runs
+from hcp_jax.ray_sweep import Job, run_on_ray
 from hcp_jax.training import loop, run_folder
 from hcp_jax.training.metrics import METRICS_FILE, read_rows
 
@@ -21,22 +25,46 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--seeds", type=int, default=1, help="seeds 0 to SEEDS-1 of each experiment")
     parser.add_argument("--out", type=pathlib.Path, help="folder of run folders (default: runs/LIST)")
     parser.add_argument("--summary", type=pathlib.Path, help="JSON file for the table (default: OUT/summary.json)")
+    parser.add_argument("--ray", metavar="ADDRESS", help="run on this Ray cluster; `local`: on one of this machine's cores")
+    parser.add_argument("--cpus-per-run", type=int, default=1, help="with --ray: cores that each run reserves")
     known, overrides = parser.parse_known_args(arguments)
     with command_line.user_errors_end_the_command():
         configs = [command_line.apply_overrides(config, overrides) for config in command_line.load_configs(known.list)]
         command_line.enable_compilation_cache()
         out = known.out or pathlib.Path("runs") / pathlib.Path(known.list).stem
-        folders = []
-        for seed in range(known.seeds):
-            for config in configs:
-                folder = out / f"{config.name}_s{seed}"
-                folders.append(folder)
-                if run_experiment(dataclasses.replace(config, seed=seed), folder):
-                    return
-        write_json(known.summary or out / "summary.json", summarise_runs(folders))
+        jobs = [
+            (dataclasses.replace(config, seed=seed), out / f"{config.name}_s{seed}")
+            for seed in range(known.seeds)
+            for config in configs
+        ]
+        run_all = run_here if known.ray is None else functools.partial(run_there, address=known.ray, cpus=known.cpus_per_run)
+        if run_all(jobs):
+            write_json(known.summary or out / "summary.json", summarise_runs([folder for _, folder in jobs]))
 
 
-def run_experiment(config, folder: pathlib.Path) -> bool:
+def run_here(jobs: list[Job]) -> bool:
+    """Runs one after the other. Returns whether all are done; False if the user interrupted one."""
+    return not any(run_experiment(config, folder) for config, folder in jobs)
+
+
+def run_there(jobs: list[Job], address: str, cpus: int) -> bool:
+    """Runs on a Ray cluster. Ends the command with exit code 1 where some runs failed, after the others are done."""
+    failed = []
+    for (_, folder), error in run_on_ray(jobs, run_in_worker, address, cpus):
+        print(f"{folder}: {error or 'done'}", flush=True)
+        failed += [folder] if error else []
+    if failed:
+        print(f"{len(failed)} of {len(jobs)} runs failed: {', '.join(map(str, failed))}", file=sys.stderr)
+        sys.exit(command_line.BROKEN)
+    return True
+
+
+def run_in_worker(config: dict, folder: str) -> None:
+    command_line.enable_compilation_cache()
+    run_experiment(from_dict(Config, config), pathlib.Path(folder))
+
+
+def run_experiment(config: Config, folder: pathlib.Path) -> bool:
     """Trains, resumes or skips one experiment. Returns whether the user interrupted it."""
     resume = (folder / run_folder.CONFIG_FILE).exists()
     if resume:

@@ -115,6 +115,7 @@ class DDPG:
         self.actor = DeterministicActor(config.hidden_sizes, env.action_size, config.layer_norm)
         self.critic = Critic(config.hidden_sizes, config.layer_norm)
         weight_decay = optax.add_decayed_weights(config.critic_weight_decay, mask=mark_kernels)
+        self._num_iterations = num_iterations
         num_updates = num_iterations * config.updates_per_iteration
 
         def adam(rate: float) -> optax.GradientTransformation:
@@ -272,11 +273,12 @@ class DDPG:
     def _learn(self, state: DDPGState, key: jax.Array) -> DDPGState:
         """All updates of one iteration."""
         config = self.config
+        num_steps = jnp.where(state.iteration > config.n_step_from * self._num_iterations, config.n_step, 1)
 
         def update(carry, key):
             params, target_params, opt_state, skipped = carry
             key_sample, key_goals = jax.random.split(key)
-            sample = sample_steps(state.replay, key_sample, config.batch_size, config.n_step)
+            sample = sample_steps(state.replay, key_sample, config.batch_size, config.n_step, num_steps)
             goal = relabel_goals(state.replay, sample, key_goals, config.relabel, config.future_k, config.future_candidates)
             sample, goal = split_rows((sample, goal))
             grads, metrics = jax.grad(self._loss, has_aux=True)(params, target_params, state.statistics, sample, goal)

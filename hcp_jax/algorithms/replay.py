@@ -100,14 +100,24 @@ def add_episodes(replay: Replay, episodes: EpisodeBatch) -> Replay:
     return Replay(stored, replay.num_added + num_new)
 
 
-def sample_steps(replay: Replay, key: jax.Array, num_samples: int, max_steps: int = 1) -> StepSample:
-    """Draws first steps uniformly from the episodes held, which must not be none, with the up to `max_steps` - 1 after each."""
+def sample_steps(
+    replay: Replay, key: jax.Array, num_samples: int, max_steps: int = 1, num_steps: jax.Array | int | None = None
+) -> StepSample:
+    """Draws first steps uniformly from the episodes held, which must not be none, and those that follow them.
+
+    Args:
+        replay: the buffer.
+        key: of the draws.
+        num_samples: runs of steps.
+        max_steps: K, the longest a run can be.
+        num_steps: [] how long they are, if the episode goes on so long; at most and by default `max_steps`.
+    """
     key_row, key_step = jax.random.split(key)
     episodes = replay.episodes
     row = jax.random.randint(key_row, (num_samples,), 0, jnp.maximum(replay.size, 1))
     length = episodes.length[row]
     step = sample_below(key_step, jnp.maximum(length, 1))
-    num_steps = jnp.clip(length - step, 1, max_steps)
+    num_steps = jnp.clip(length - step, 1, max_steps if num_steps is None else num_steps)
     run = jnp.minimum(step[:, None] + jnp.arange(max_steps), episodes.action.shape[1] - 1)
     return StepSample(
         row=row,

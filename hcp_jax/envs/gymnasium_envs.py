@@ -1,4 +1,4 @@
-"""Gymnasium's interfaces to our environments, for agents that are not ours. Needs the extra `gymnasium`.
+"""Gymnasium's interfaces to our environments, for agents that are not ours.
 
 Worlds that end restart in the same step (`AutoresetMode.SAME_STEP`): the observation is the next episode's first, the ended
 one's last is `info["final_obs"]`. `info["robot_id"]` is the robot of each world.

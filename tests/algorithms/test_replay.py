@@ -73,6 +73,12 @@ def test_runs_of_steps_stay_in_their_episode_and_end_with_it(key):
         np.testing.assert_array_equal(sample.achieved_goal[counts, ahead, 2], first[counts] + ahead + 1)
 
 
+def test_runs_are_as_long_as_asked(key):
+    sample = sample_steps(filled(coded_episodes(0, 5)), key, 500, max_steps=4, num_steps=jnp.int32(1))
+    np.testing.assert_array_equal(sample.num_steps, 1)
+    np.testing.assert_array_equal(sample.next_obs[:, 1], sample.obs[:, 1] + 1)
+
+
 def test_more_episodes_than_the_buffer_holds_are_refused():
     with pytest.raises(ValueError, match="6 episodes do not fit a buffer of 5"):
         filled(coded_episodes(0, 6))

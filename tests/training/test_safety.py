@@ -1,4 +1,4 @@
-"""What a run does when something goes wrong, apart from being killed (tests/training/test_kill.py)."""
+"""What a run does when something goes wrong, apart from being killed (tests/faults)."""
 
 import dataclasses
 import pathlib
