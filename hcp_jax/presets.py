@@ -70,6 +70,7 @@ FAST_DDPG = DDPGConfig(
     updates_per_iteration=160,
     tau=0.02,
     failing_share=0.3,
+    refine_from=0.5,
     stop_at_success=True,
     actor_average=0.97,
 )
@@ -80,7 +81,6 @@ FAST_PEG_DDPG = dataclasses.replace(
     FAST_DDPG,
     actor_learning_rate=3e-4,
     n_step=5,
-    n_step_from=0.5,
     buffer_episodes=10_000,
     future_k=1,
     future_candidates=4,

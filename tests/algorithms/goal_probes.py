@@ -1,4 +1,4 @@
-"""A goal-conditioned environment of one idea: a point on a plane is moved by its action, in the sense that its robot has."""
+"""A goal-conditioned environment of one idea: a point on a plane is moved by its action, turned as its robot turns it."""
 
 import jax
 import jax.numpy as jnp
@@ -9,16 +9,17 @@ REACH = 0.15
 
 
 class PlaneEnv:
-    """Robot i moves by 0.25 * action * direction[i]; goals lie on the circle of radius 1, success is to be within `REACH`.
+    """Robot i moves by 0.25 * action turned by turns[i] [rad]; goals lie on the circle of radius 1, success is within `REACH`.
 
     With `diverging`, robot 0's physics fails after its second step.
     """
 
     observation_size = goal_size = action_size = 2
 
-    def __init__(self, directions: tuple[float, ...], episode_length: int = 10, diverging: bool = False):
-        self.directions, self.episode_length = jnp.asarray(directions), episode_length
-        self.num_robots, self.diverging = len(directions), diverging
+    def __init__(self, turns: tuple[float, ...], episode_length: int = 10, diverging: bool = False):
+        cosine, sine = jnp.cos(jnp.asarray(turns)), jnp.sin(jnp.asarray(turns))
+        self._rotations = jnp.stack([jnp.stack([cosine, -sine], -1), jnp.stack([sine, cosine], -1)], -2)
+        self.num_robots, self.episode_length, self.diverging = len(turns), episode_length, diverging
 
     def reset(self, key: jax.Array, index: jax.Array) -> GoalState:
         key, key_goal = jax.random.split(key)
@@ -30,7 +31,7 @@ class PlaneEnv:
     def step(self, state: GoalState, action: jax.Array) -> tuple[GoalState, GoalTransition]:
         action = jnp.clip(action, -1.0, 1.0)
         diverged = self.diverging & (state.physics >= 2) & (state.index == 0)
-        moved = state.obs + 0.25 * action * self.directions[state.index][:, None]
+        moved = state.obs + 0.25 * jnp.einsum("bij,bj->bi", self._rotations[state.index], action)
         position = jnp.where(diverged[:, None], state.obs, moved)
         reward, success = self.compute_reward(position, state.desired_goal, action)
         distance = jnp.linalg.norm(position - state.desired_goal, axis=-1)

@@ -25,11 +25,11 @@ CONFIG = DDPGConfig(
 )
 
 
-def make(directions=(1.0,), learned=False, diverging=False, **changes) -> DDPG:
-    env = PlaneEnv(directions, diverging=diverging)
+def make(turns=(0.0,), learned=False, diverging=False, **changes) -> DDPG:
+    env = PlaneEnv(turns, diverging=diverging)
     config = dataclasses.replace(CONFIG, **changes)
     return DDPG(
-        env, PlaneInputs(len(directions), learned), config, num_envs=10, num_iterations=40, embedding_learning_rate=3e-3
+        env, PlaneInputs(len(turns), learned), config, num_envs=10, num_iterations=40, embedding_learning_rate=3e-3
     )
 
 
@@ -65,12 +65,13 @@ def test_learning_rates_have_fallen_to_their_decay_at_the_end_of_the_run():
     assert stopped < 1e-6
 
 
-def test_robots_that_need_opposite_actions_are_solved_with_an_embedding_and_not_without():
-    """The best of four seeds: on the others DDPG ends where one robot is solved and the other is not."""
-    directions = (1.0, -1.0)
-    embedded, blind = (make(directions, learned=learned, updates_per_iteration=200) for learned in (True, False))
-    assert any(success_rate(embedded, trained(embedded, seed=seed)) > 0.9 for seed in range(4))
-    assert all(success_rate(blind, trained(blind, seed=seed)) < 0.7 for seed in (1, 2))
+def test_robots_that_turn_their_actions_apart_are_solved_with_an_embedding_and_not_without():
+    """69 degrees to either side. At 180 degrees apart DDPG often ends where one robot is solved and the other is not."""
+    turns = (1.2, -1.2)
+    embedded, blind = (make(turns, learned=learned, updates_per_iteration=100) for learned in (True, False))
+    for seed in (0, 1):
+        assert success_rate(embedded, trained(embedded, seed=seed)) > 0.9
+        assert success_rate(blind, trained(blind, seed=seed)) < 0.7
 
 
 def test_the_value_of_a_success_is_its_reward_and_a_failure_is_discounted_for_ever():
@@ -127,7 +128,7 @@ def test_nothing_is_learned_before_the_warm_up_and_all_actions_are_random():
 
 
 def test_steps_after_a_divergence_are_not_stored_as_learnable_and_the_robot_is_named():
-    state = trained(make((1.0, 1.0), diverging=True), 2)
+    state = trained(make((0.0, 0.0), diverging=True), 2)
     replay = state.replay
     lengths = replay.episodes.length[:20]
     np.testing.assert_array_equal(lengths, np.where(replay.episodes.index[:20] == 0, 2, 10))
@@ -145,14 +146,14 @@ def test_an_episode_may_end_with_the_step_that_reaches_its_goal():
 
 
 def test_robots_that_fail_are_drawn_more_often_as_far_as_asked():
-    learner = make((1.0,) * 20, failing_share=0.5)
+    learner = make((0.0,) * 20, failing_share=0.5)
     state = trained(learner, 1).replace(failure=jnp.where(jnp.arange(20) == 3, 1.0, 0.0))
     drawn = jnp.stack([learner._draw_robots(state, key) for key in jax.random.split(jax.random.key(1), 100)])
     assert 0.4 < float((drawn == 3).mean()) < 0.6
 
 
 def test_a_robots_failures_are_averaged_over_its_episodes():
-    learner = make((1.0, 1.0), warmup_episodes=1000)
+    learner = make((0.0, 0.0), warmup_episodes=1000)
     state = trained(learner, 1)
     episodes = jax.tree.map(lambda leaf: leaf[:10], state.replay.episodes)
     goal = jnp.broadcast_to(episodes.desired_goal[:, None], episodes.action.shape)
