@@ -70,7 +70,6 @@ FAST_DDPG = DDPGConfig(
     updates_per_iteration=160,
     tau=0.02,
     failing_share=0.3,
-    refine_from=0.5,
     stop_at_success=True,
     actor_average=0.97,
 )
@@ -85,6 +84,7 @@ FAST_PEG_DDPG = dataclasses.replace(
     future_k=1,
     future_candidates=4,
     failing_share=0.5,
+    refine_from=0.5,
     stop_at_success=False,
     actor_average=0.95,
     exploration_noise=0.2,
