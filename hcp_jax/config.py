@@ -221,7 +221,7 @@ class DDPGConfig:
         critic_weight_decay: L2 penalty on the critic's kernels.
         gamma: discount per control step.
         n_step: steps whose rewards are summed before the target network's value (paper: 1).
-        refine_from: share of the run after which `n_step` and `failing_share` count; until then they are 1 and 0.
+        n_step_from: share of the run after which `n_step` counts; until then it is 1.
         tau: step of the target networks towards the networks, per update.
         batch_size: steps per update.
         buffer_episodes: capacity of the replay buffer (paper: 1e6 steps, 5000 episodes of 200).
@@ -250,7 +250,7 @@ class DDPGConfig:
     critic_weight_decay: float = 1e-3
     gamma: float = 0.99
     n_step: int = 1
-    refine_from: float = 0.0
+    n_step_from: float = 0.0
     tau: float = 0.01
     batch_size: int = 128
     buffer_episodes: int = 5_000
@@ -278,7 +278,7 @@ class DDPGConfig:
             _require(_positive(getattr(self, name)), f"ddpg.{name}", getattr(self, name), "a number above 0")
         for name in ("learning_rate_decay", "critic_weight_decay", "exploration_noise"):
             _require(_at_least_zero(getattr(self, name)), f"ddpg.{name}", getattr(self, name), "a number of at least 0")
-        for name in ("gamma", "tau", "random_action_probability", "failing_share", "refine_from"):
+        for name in ("gamma", "tau", "random_action_probability", "failing_share", "n_step_from"):
             _require(0.0 <= getattr(self, name) <= 1.0, f"ddpg.{name}", getattr(self, name), "a number in [0, 1]")
         for name in ("actor_average", "exploration_correlation"):
             _require(0.0 <= getattr(self, name) < 1.0, f"ddpg.{name}", getattr(self, name), "a number in [0, 1)")

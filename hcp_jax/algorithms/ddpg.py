@@ -248,12 +248,7 @@ class DDPG:
             return even
         key_failing, key_choice = jax.random.split(jax.random.fold_in(key, 1))
         failing = jax.random.categorical(key_failing, jnp.log(state.failure + 1e-3), shape=even.shape).astype(jnp.int32)
-        share = jnp.where(self._refines(state), self.config.failing_share, 0.0)
-        return jnp.where(jax.random.uniform(key_choice, even.shape) < share, failing, even)
-
-    def _refines(self, state: DDPGState) -> jax.Array:
-        """Whether the run is in its last part, which `refine_from` starts: [] bool."""
-        return state.iteration >= self.config.refine_from * self._num_iterations
+        return jnp.where(jax.random.uniform(key_choice, even.shape) < self.config.failing_share, failing, even)
 
     def _explore(self, state: DDPGState, env_state: GoalState, noise: jax.Array, key: jax.Array) -> jax.Array:
         """The policy's action with standard Gaussian `noise` scaled, or a uniform one: always while the buffer warms up."""
@@ -278,7 +273,7 @@ class DDPG:
     def _learn(self, state: DDPGState, key: jax.Array) -> DDPGState:
         """All updates of one iteration."""
         config = self.config
-        num_steps = jnp.where(self._refines(state), config.n_step, 1)
+        num_steps = jnp.where(state.iteration > config.n_step_from * self._num_iterations, config.n_step, 1)
 
         def update(carry, key):
             params, target_params, opt_state, skipped = carry
