@@ -12,7 +12,9 @@ from hcp_jax.evaluation.hopper_sweeps import evaluate_hoppers
 from hcp_jax.evaluation.new_robots import RangeChange
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.hardware.arm import TYPES
+from hcp_jax.hardware.robot_file import read_robot
 from hcp_jax.physics.base import INTEGRATORS, PHYSICS
+from hcp_jax.robot import add_chain_options
 from hcp_jax.training.run_folder import read_config
 
 
@@ -33,6 +35,8 @@ def main(arguments: list[str] | None = None) -> None:
         help="draw the new robots' hardware from another range than in training: --range damping 30 40",
     )
     parser.add_argument("--pool", type=pathlib.Path, help="take the new robots from a folder that RobotPool.save wrote")
+    parser.add_argument("--robot", type=pathlib.Path, help="your arm, a URDF or MJCF file; see hcp_jax.robot check")
+    add_chain_options(parser)
     parser.add_argument("--seed", type=int, default=0, help="seed of the initial states")
     parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
     parser.add_argument("--json", type=pathlib.Path, help="file to write the whole record to")
@@ -49,12 +53,16 @@ def main(arguments: list[str] | None = None) -> None:
                 raise ConfigError(f"--types={name}: expected types out of {', '.join(known)}")
         if options.pool and options.range:
             raise ConfigError("--range: not with --pool, whose robots are drawn already")
+        if options.robot and (task == "hopper" or options.types or options.pool or options.range):
+            raise ConfigError("--robot: goes with a policy of arms, and not with --types, --pool or --range")
         command_line.enable_compilation_cache()
         settings = {name: getattr(options, name) for name in ("trials", "robots_per_trial", "physics", "seed", "best")}
         settings |= {"ranges": [read_range(*words) for words in options.range], "pool_folder": options.pool}
         if task == "hopper":
             record = evaluate_hoppers(options.run, fit_steps=options.fit_steps, **settings)
         else:
+            if options.robot:
+                settings["own_robot"] = (options.robot.stem, read_robot(options.robot, options.base, options.tip))
             record = evaluate_arms(options.run, types=options.types or (), **settings)
     print_table(record)
     if options.json:

@@ -12,7 +12,9 @@ from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, load_pool
 from hcp_jax.experiment.arm import make_arm_experiment, make_evaluator, make_heldout_arms
 from hcp_jax.hardware.arm import OTHER_ARMS, TYPES
 from hcp_jax.hardware.inverse_kinematics import is_reachable
+from hcp_jax.hardware.own_arm import make_own_pool
 from hcp_jax.hardware.pool import RobotPool
+from hcp_jax.hardware.robot_file import RobotFile
 from hcp_jax.physics.base import default_physics
 from hcp_jax.training import run_folder
 from hcp_jax.training.warm_start import load_policy
@@ -30,6 +32,7 @@ def evaluate_arms(
     best: bool = False,
     ranges: Sequence[RangeChange] = (),
     pool_folder: pathlib.Path | None = None,
+    own_robot: tuple[str, RobotFile] | None = None,
 ) -> dict:
     """Evaluates the newest checkpoint of a run folder, or its best one, on held-out robots 0..trials*robots_per_trial-1 of each
     type, one episode each; or on those of a saved pool, in order, all of a type before any twice.
@@ -43,6 +46,7 @@ def evaluate_arms(
         best: take the checkpoint with the highest success on held-out robots of the training types.
         ranges: ranges that the new robots are drawn from, where others than in training.
         pool_folder: a saved pool to take the robots from.
+        own_robot: one arm with its name, of which all robots are copies.
 
     Returns:
         The record that `evaluate --json` writes (DESIGN.md, "The command line"); success in percent, distances in m.
@@ -54,7 +58,7 @@ def evaluate_arms(
     pools, env_config = config.pool, config.env
     assert isinstance(pools, ArmPoolConfig)
     assert isinstance(env_config, ArmConfig)
-    if not types and not pool_folder:
+    if not types and not pool_folder and not own_robot:
         types = tuple(dict.fromkeys((*pools.types, *pools.left_out)))
     for name in types:
         if config.task == "reacher" and name in OTHER_ARMS:
@@ -63,7 +67,9 @@ def evaluate_arms(
     run = make_arm_experiment(config, default_physics() if physics == "auto" else physics)
     iteration, state = load_policy(folder, run, best)
     count, upright = trials * robots_per_trial, config.task == "peg_insertion"
-    if pool_folder:
+    if own_robot:
+        pools_by_type = {own_robot[0]: make_own_pool(config.task, own_robot[1])}
+    elif pool_folder:
         pools_by_type = split_types(load_pool(pool_folder, run.train_pool), types)
     else:
         drawn = change_ranges(config, ranges)
@@ -86,7 +92,8 @@ def evaluate_arms(
     }
     for name, pool in pools_by_type.items():
         evaluator = make_evaluator(config, run.learner, run.make_env, pool, run.train_pool)
-        key_play, key_goal = jax.random.split(jax.random.fold_in(jax.random.key(seed), TYPES.index(name)))
+        number = TYPES.index(name) if name in TYPES else len(TYPES)
+        key_play, key_goal = jax.random.split(jax.random.fold_in(jax.random.key(seed), number))
         index = np.arange(count) % pool.num_robots
         episodes = evaluator(run.learner.policy(state), index, key_play)
         goals = np.asarray(episodes.desired_goal)

@@ -195,7 +195,7 @@ def _quat_of(rotation: np.ndarray) -> np.ndarray:
 
 
 def _torque_limit(model: mujoco.MjModel, joint: int) -> float:
-    """Largest torque of the motor on `joint`, 0 without one."""
+    """Largest torque of the motor on `joint`; without one what the joint allows (a URDF's effort), 0 if that is open."""
     for actuator in range(model.nu):
         if model.actuator_trnid[actuator, 0] == joint:
             gain = abs(model.actuator_gear[actuator, 0] * model.actuator_gainprm[actuator, 0])
@@ -204,4 +204,4 @@ def _torque_limit(model: mujoco.MjModel, joint: int) -> float:
             if model.actuator_forcelimited[actuator]:
                 gain = min(gain, np.abs(model.actuator_forcerange[actuator]).max())
             return float(gain)
-    return 0.0
+    return float(np.abs(model.jnt_actfrcrange[joint]).max()) if model.jnt_actfrclimited[joint] else 0.0

@@ -1,0 +1,136 @@
+import dataclasses
+import random
+
+import numpy as np
+import pytest
+from robot_texts import MJCF, arm, joint, link, robot
+
+from hcp_jax.hardware.robot_file import RobotFileError, read_robot, read_robot_here
+
+BOMB = '<?xml version="1.0"?><!DOCTYPE b [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><robot name="&b;"/>'
+FORK = robot(*(link(f"l{i}") for i in range(3)), joint("j0", "l0", "l1"), joint("j1", "l0", "l2"))
+GRIPPER = robot(
+    *(link(f"l{i}") for i in range(4)),
+    joint("j0", "l0", "l1"),
+    joint("f0", "l1", "l2", kind="prismatic"),
+    joint("f1", "l1", "l3", kind="prismatic"),
+)
+OUTSIDE = '<mujoco><asset><mesh name="m" file="../../secret.stl"/></asset><worldbody/></mujoco>'
+BAD = {
+    "not XML": ("I am no robot", "not XML"),
+    "empty": ("", "not XML"),
+    "of another kind": ("<svg/>", "expected <robot>"),
+    "an XML bomb": (BOMB, "document type declaration"),
+    "branching": (FORK, "branches: to l[12] and to l[12]; choose one end with --tip"),
+    "too long": (arm(8), "8 hinges between base and tip: expected 1 to 7"),
+    "without joints": (robot(link("l0")), "no hinge joints"),
+    "with a prismatic joint": (
+        robot(*(link(f"l{i}") for i in range(4)), joint("j0", "l0", "l1"), joint("p", "l1", "l2", kind="prismatic"),
+              joint("j1", "l2", "l3")),
+        "joint p: is prismatic",
+    ),
+    "without limits": (arm(limit=""), "joint j0: revolute without limits"),
+    "without mass": (
+        robot(link("l0"), '<link name="l1"/>', joint("j0", "l0", "l1")),
+        "link l1: moves and has no mass",
+    ),
+    "of zero inertia": (
+        robot(link("l0"), link("l1", inertia='<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/>'),
+              joint("j0", "l0", "l1")),
+        "mass and inertia of moving bodies must be larger",
+    ),
+    "with a mesh outside its folder": (OUTSIDE, "outside the file's folder"),
+}  # fmt: skip
+
+
+def write(folder, text: str):
+    path = folder / "robot.xml"
+    path.write_text(text)
+    return path
+
+
+def test_urdf_and_mjcf_of_one_arm_give_the_same_chain(tmp_path):
+    urdf = read_robot(write(tmp_path, arm()))
+    mjcf = read_robot(write(tmp_path, MJCF))
+    assert urdf.joints == mjcf.joints == ("j0", "j1")
+    assert (urdf.base, urdf.tip) == (mjcf.base, mjcf.tip) == ("l0", "l2")
+    for field in dataclasses.fields(urdf.chain):
+        one, other = getattr(urdf.chain, field.name), getattr(mjcf.chain, field.name)
+        if field.name != "inertia_quat":  # of equal principal axes there are several
+            np.testing.assert_allclose(one, other, atol=1e-9, err_msg=field.name)
+    np.testing.assert_allclose(urdf.chain.torque_limit, 20.0)
+    np.testing.assert_allclose(urdf.chain.joint_range, [[-1.5, 1.5]] * 2)
+    np.testing.assert_allclose(urdf.chain.damping, 0.5)
+    np.testing.assert_allclose(urdf.chain.frictionloss, 0.1)
+    assert "meshes that are missing: m" in mjcf.notes
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_what_is_no_serial_arm_is_said_in_one_line(kind, tmp_path):
+    text, message = BAD[kind]
+    with pytest.raises(RobotFileError, match=message) as error:
+        read_robot_here(write(tmp_path, text), None, None)
+    assert "\n" not in str(error.value)
+
+
+def test_a_missing_file_and_a_missing_tip_are_said(tmp_path):
+    with pytest.raises(RobotFileError, match="No such file"):
+        read_robot(tmp_path / "nothing.urdf")
+    with pytest.raises(RobotFileError, match="--tip=hand: no such link; there are l0, l1, l2"):
+        read_robot(write(tmp_path, arm()), tip="hand")
+
+
+def test_fingers_are_fixed_and_a_fork_needs_a_tip(tmp_path):
+    gripper = read_robot_here(write(tmp_path, GRIPPER), None, None)
+    assert (gripper.joints, gripper.tip) == (("j0",), "l1")
+    assert "joints fixed at 0: f0, f1" in gripper.notes
+    np.testing.assert_allclose(gripper.chain.mass, [3.0])
+    fork = read_robot_here(write(tmp_path, FORK), None, "l2")
+    assert fork.joints == ("j1",)
+
+
+def test_from_a_base_on_joints_before_it_are_fixed_and_it_stands_at_the_origin(tmp_path):
+    robot_file = read_robot_here(write(tmp_path, arm(3)), "l1", None)
+    assert robot_file.joints == ("j1", "j2")
+    np.testing.assert_allclose(robot_file.chain.pos[0], [0, 0, 0.3], atol=1e-9)
+    assert "joints fixed at 0: j0" in robot_file.notes
+
+
+def test_what_a_file_leaves_open_is_assumed_and_said(tmp_path):
+    open_limit = '<limit lower="-1" upper="1"/>'
+    robot_file = read_robot_here(write(tmp_path, arm(kind="continuous", limit=open_limit)), None, None)
+    assert any(note.startswith("continuous joints limited") for note in robot_file.notes)
+    assert any(note.startswith("torque limits assumed [N m]: j0 80, j1 80") for note in robot_file.notes)
+    np.testing.assert_allclose(robot_file.chain.torque_limit, 80.0)
+    np.testing.assert_allclose(robot_file.chain.joint_range, [[-np.pi, np.pi]] * 2)
+
+
+@pytest.mark.slow
+def test_three_hundred_damaged_files_are_read_or_refused_in_one_line(tmp_path):
+    """pytest -m slow tests/hardware/test_robot_file.py (about 3 minutes)"""
+    draw, outcomes = random.Random(0), {"read": 0, "refused": 0}
+    for number in range(300):
+        text = list(draw.choice([arm(3), MJCF, GRIPPER, FORK, arm(7)]))
+        for _ in range(draw.choice([1, 3, 10, 40])):
+            place = draw.randrange(len(text))
+            what = draw.random()
+            if what < 0.3:
+                del text[place : place + draw.choice([1, 5, 50])]
+            elif what < 0.6:
+                text[place] = draw.choice(["", "<", ">", '"', "9", "-", "e", "\x00", "nan", "1e999", "../", "é"])
+            elif what < 0.8:
+                text[place:place] = text[draw.randrange(len(text)) :][: draw.choice([5, 80, 400])]
+            else:
+                text = text[:place] if draw.random() < 0.2 else text
+            text = text or ["<"]
+        path = tmp_path / f"{number}.xml"
+        path.write_text("".join(text))
+        try:
+            read_robot(path)
+            outcomes["read"] += 1
+        except RobotFileError as error:
+            assert "\n" not in str(error)
+            assert "without an answer" not in str(error), f"{path}: MuJoCo crashed"
+            assert "not read within" not in str(error)
+            outcomes["refused"] += 1
+    assert min(outcomes.values()) > 10, outcomes
