@@ -52,7 +52,9 @@ def main(arguments: list[str] | None = None) -> None:
         rows = []
         for row in measure(options, config):
             rows.append(row)
-            print("  ".join(f"{name} {value:,}" if isinstance(value, (int, float)) else str(value) for name, value in row.items()))
+            print(
+                "  ".join(f"{name} {value:,}" if isinstance(value, (int, float)) else str(value) for name, value in row.items())
+            )
         if options.subject == "physics":
             print_speeds(config.name, rows)
         else:

@@ -1,7 +1,7 @@
 """Our environments for agents that are not ours, as Gymnasium's `VectorEnv` and `Env`.
 
-    from hcp_jax import gym, presets
-    worlds = gym.make_vector_env(presets.arm("mine", "reacher", "chain_fk", left_out="H"), num_envs=128)
+from hcp_jax import gym, presets
+worlds = gym.make_vector_env(presets.arm("mine", "reacher", "chain_fk", left_out="H"), num_envs=128)
 """
 
 from hcp_jax.config import Config, ConfigError
@@ -19,8 +19,8 @@ def make_vector_env(config: Config, num_envs: int = 0, heldout: bool = False) ->
         heldout: of held-out robots (and of types left out) instead.
 
     Returns:
-        `Box` observations with v_h for the hopper, `Dict` ones for the arms, whose `observation` holds v_h and the features that
-        no goal has a part in.
+        `Box` observations with v_h for the hopper, `Dict` ones for the arms, whose `observation` holds v_h and the features
+        that no goal has a part in.
 
     Raises:
         ConfigError: v_h is learned (`encoding="embedding"`): it belongs to our agents.

@@ -1,4 +1,4 @@
-"""Runs of a sweep on a Ray cluster. Needs the extra `ray`; on several machines, this package and the run folders on each of them."""
+"""Runs of a sweep on a Ray cluster. Needs the extra `ray`, and on each of several machines this package and the run folders."""
 
 import pathlib
 from collections.abc import Callable, Iterator, Sequence

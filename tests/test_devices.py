@@ -25,7 +25,9 @@ HOPPER = presets.hopper(
 ARMS = presets.arm(
     "a", "reacher", "chain_fk", num_envs=8, total_env_steps=640,
     pool=ArmPoolConfig(("A", "I"), (), 4, 2), env=ArmConfig(episode_length=10),
-    ddpg=DDPGConfig(hidden_sizes=(8, 8), batch_size=16, updates_per_iteration=5, buffer_episodes=16, warmup_episodes=8, n_step=3),
+    ddpg=DDPGConfig(
+        hidden_sizes=(8, 8), batch_size=16, updates_per_iteration=5, buffer_episodes=16, warmup_episodes=8, n_step=3
+    ),
 )
 results = {"devices": get_mesh().size}
 RUNS = {"hopper": (HOPPER, "native"), "arms": (ARMS, "native"), "mjx": (HOPPER, "mjx-jax")}

@@ -5,7 +5,20 @@ import pathlib
 
 PACKAGE = pathlib.Path(__file__).resolve().parents[1] / "hcp_jax"
 # From the ground up (docs: DESIGN). A module may import from its own layer and those before it.
-LAYERS = ["devices", "hardware", "physics", "envs", "config", "presets", "policies", "algorithms", "experiment", "gym", "training", "evaluation"]
+LAYERS = [
+    "devices",
+    "hardware",
+    "physics",
+    "envs",
+    "config",
+    "presets",
+    "policies",
+    "algorithms",
+    "experiment",
+    "gym",
+    "training",
+    "evaluation",
+]
 
 
 def layer_of(module: str) -> int:

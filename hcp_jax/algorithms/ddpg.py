@@ -339,9 +339,7 @@ class DDPG:
         return jax.vmap(apply, in_axes=(0, None, None))(critic, inputs, action)
 
 
-def sum_rewards(
-    reward: jax.Array, success: jax.Array, num_steps: jax.Array, gamma: float
-) -> tuple[jax.Array, jax.Array]:
+def sum_rewards(reward: jax.Array, success: jax.Array, num_steps: jax.Array, gamma: float) -> tuple[jax.Array, jax.Array]:
     """The discounted rewards of runs of K steps until the first success, and what the value after them counts for.
 
     Args:

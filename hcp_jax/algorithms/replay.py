@@ -46,10 +46,10 @@ class Replay:
 class StepSample:
     """N runs of up to K steps, each of an episode drawn uniformly.
 
-    row: [N] of the buffer; step: [N] the first of the run; num_steps: [N] int32, K or as many as the episode has left; valid: [N]
-    bool, False for an episode that has nothing to learn from; obs: [N, O] before the run, next_obs: after it; action: [N, K, A]
-    and achieved_goal: [N, K, G], of the states stepped to, of which those from `num_steps` on mean nothing. The rest as in
-    `EpisodeBatch`.
+    row: [N] of the buffer; step: [N] the first of the run; num_steps: [N] int32, K or as many as the episode has left;
+    valid: [N] bool, False for an episode that has nothing to learn from; obs: [N, O] before the run, next_obs: after it;
+    action: [N, K, A] and achieved_goal: [N, K, G], of the states stepped to, of which those from `num_steps` on mean nothing.
+    The rest as in `EpisodeBatch`.
     """
 
     row: jax.Array

@@ -3,7 +3,7 @@
 | row | what is timed |
 |---|---|
 | `iteration` | collecting and learning, as `train` does |
-| `collect` | the iteration's control steps, with as little learning as the learner allows: one update of DDPG, one epoch of PPO |
+| `collect` | the iteration's control steps, with the least learning: one update of DDPG, one epoch of PPO |
 | `update` | one update of all networks: drawing and relabelling of DDPG and the optimiser included |
 | `matmul` | the matrix products of such an update alone: its bound |
 """
@@ -82,9 +82,7 @@ def with_passes(run: Run, number: int) -> tuple[Callable, object]:
     else:
         changed = dataclasses.replace(config.ppo, num_epochs=number)
         embedding = dataclasses.replace(config.embedding, identify_steps=0)
-        changed_learner = PPO(
-            learner.env, learner.conditioning, changed, embedding, learner.num_envs, run.num_iterations
-        )
+        changed_learner = PPO(learner.env, learner.conditioning, changed, embedding, learner.num_envs, run.num_iterations)
     return changed_learner.train, changed_learner.init(jax.random.key(config.seed))
 
 

@@ -18,9 +18,8 @@ class Product(NamedTuple):
 
     @property
     def flops(self) -> int:
-        (contracted, _), (batch, right_batch) = self.dimensions
+        (contracted, right_contracted), (_, right_batch) = self.dimensions
         rows = math.prod(size for axis, size in enumerate(self.left) if axis not in contracted)
-        (_, right_contracted), _ = self.dimensions
         columns = math.prod(size for axis, size in enumerate(self.right) if axis not in (*right_contracted, *right_batch))
         return 2 * rows * columns * math.prod(self.left[axis] for axis in contracted)
 

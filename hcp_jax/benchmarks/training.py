@@ -43,7 +43,7 @@ def benchmark_training(config: Config, rows: list[str], seconds: float) -> Itera
     """Times control steps of training.
 
     Args:
-        config: the experiment; peers get its robots, networks' widths and gradient samples per step, and keep their own defaults.
+        config: the experiment; peers get its robots, networks' widths and gradient samples per step, otherwise their defaults.
         rows: names out of `TRAINING_ROWS`; those of another task are left out.
         seconds: shortest time of one measurement of ours; peers learn for at least that long.
 

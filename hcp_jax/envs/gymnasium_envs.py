@@ -173,7 +173,9 @@ class GoalVectorEnv(_VectorEnv):
             info: what `step` said, as a dict or one dict per row, with the executed `action`.
         """
         action = info["action"] if isinstance(info, dict) else np.stack([row["action"] for row in info])
-        return np.asarray(self.env.compute_reward(jnp.asarray(achieved_goal), jnp.asarray(desired_goal), jnp.asarray(action))[0])
+        return np.asarray(
+            self.env.compute_reward(jnp.asarray(achieved_goal), jnp.asarray(desired_goal), jnp.asarray(action))[0]
+        )
 
 
 class SingleEnv(gymnasium.Env):

@@ -15,13 +15,14 @@ from xml.parsers import expat
 import mujoco
 import numpy as np
 
-from hcp_jax.hardware.chain import MAX_JOINTS, TIP_SITE, Chain, ChainError, read_chain
+from hcp_jax.hardware.chain import MAX_JOINTS, Chain, ChainError, read_chain
 
 MAX_BYTES = 20_000_000
 MAX_SECONDS = 9.0
 # What is assumed where a file says nothing, as the arms that policies were trained on: [N m] of joint 0 to 6, [kg m^2].
 ASSUMED_TORQUE_LIMITS = (80.0, 80.0, 40.0, 40.0, 9.0, 9.0, 9.0)
 ASSUMED_ARMATURE = 0.01
+_TIP_SITE = "hcp_jax tip"  # a name that no file has
 _MIN_INERTIA = 1e-12  # [kg], [kg m^2]
 
 
@@ -93,10 +94,10 @@ def read_robot_here(path: pathlib.Path, base: str | None, tip: str | None) -> Ro
     moving = path_bodies[path_bodies.index(base_body) + (1 if base else 0) :]
     fix_joints(spec, moving, notes)
     check_masses(spec, moving)
-    tip_body.add_site(name=TIP_SITE)
+    tip_body.add_site(name=_TIP_SITE)
     try:
         model = spec.compile()
-        chain = read_chain(model)
+        chain = read_chain(model, _TIP_SITE)
     except (ValueError, mujoco.FatalError) as error:  # ChainError among them
         raise RobotFileError(one_line(error)) from error
     joints = [joint for body in moving for joint in body.joints]
@@ -300,7 +301,9 @@ def check_chain(chain: Chain, model: mujoco.MjModel, joints: list, notes: list[s
     torque[open_torques] = np.asarray(ASSUMED_TORQUE_LIMITS)[: len(torque)][open_torques]
     armature[open_armatures] = ASSUMED_ARMATURE
     if open_torques.any():
-        assumed = ", ".join(f"{name} {value:g}" for name, value, is_open in zip(names, torque, open_torques, strict=True) if is_open)
+        assumed = ", ".join(
+            f"{name} {value:g}" for name, value, is_open in zip(names, torque, open_torques, strict=True) if is_open
+        )
         notes.append(f"torque limits assumed [N m]: {assumed}")
     if open_armatures.any():
         notes.append(f"armature assumed: {ASSUMED_ARMATURE} kg m^2 of {int(open_armatures.sum())} joints")

@@ -65,7 +65,10 @@ class GoalConditioning:
         return jnp.concatenate([obs, goal, v_h, *features["robot"], *features["goal"]], axis=-1)
 
     def robot_inputs(self, index: jax.Array, obs: jax.Array) -> jax.Array:
-        """What `inputs` has that no goal has a part in, the observation first: [B, ...]. For agents that relabel goals themselves."""
+        """What `inputs` has that no goal has a part in, the observation first: [B, ...].
+
+        For agents that relabel goals themselves. Raises ValueError where v_h is learned.
+        """
         if self.is_learned:
             raise ValueError("a learned v_h is part of the learner's params")
         features = self._features(index, obs, jnp.zeros((*index.shape, 3)))

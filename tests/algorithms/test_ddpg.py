@@ -28,9 +28,7 @@ CONFIG = DDPGConfig(
 def make(turns=(0.0,), learned=False, diverging=False, **changes) -> DDPG:
     env = PlaneEnv(turns, diverging=diverging)
     config = dataclasses.replace(CONFIG, **changes)
-    return DDPG(
-        env, PlaneInputs(len(turns), learned), config, num_envs=10, num_iterations=40, embedding_learning_rate=3e-3
-    )
+    return DDPG(env, PlaneInputs(len(turns), learned), config, num_envs=10, num_iterations=40, embedding_learning_rate=3e-3)
 
 
 def success_rate(learner: DDPG, state: DDPGState, num_episodes: int = 200) -> float:

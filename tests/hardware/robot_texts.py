@@ -31,9 +31,11 @@ def arm(num_joints: int = 2, **changes) -> str:
 MJCF = """
 <mujoco model="r"><asset><mesh name="m" file="meshes/missing.stl"/></asset>
   <worldbody><body name="l0"><inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.02 0.03"/>
-    <body name="l1" pos="0 0 0.3"><joint name="j0" axis="0 1 0" range="-1.5 1.5" limited="true" damping="0.5" frictionloss="0.1"/>
+    <body name="l1" pos="0 0 0.3">
+      <joint name="j0" axis="0 1 0" range="-1.5 1.5" limited="true" damping="0.5" frictionloss="0.1"/>
       <inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.02 0.03"/><geom type="mesh" mesh="m"/>
-      <body name="l2" pos="0 0 0.3"><joint name="j1" axis="0 1 0" range="-1.5 1.5" limited="true" damping="0.5" frictionloss="0.1"/>
+      <body name="l2" pos="0 0 0.3">
+        <joint name="j1" axis="0 1 0" range="-1.5 1.5" limited="true" damping="0.5" frictionloss="0.1"/>
         <inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.02 0.03"/></body></body></body></worldbody>
   <compiler angle="radian"/><actuator><motor joint="j0" ctrlrange="-20 20" ctrllimited="true"/>
   <motor joint="j1" ctrlrange="-20 20" ctrllimited="true"/></actuator></mujoco>

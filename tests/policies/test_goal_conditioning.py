@@ -10,7 +10,16 @@ from hcp_jax.hardware.ranges import ArmRanges
 from hcp_jax.policies.conditioning import Embedding
 from hcp_jax.policies.goal_conditioning import GOAL_CONDITIONINGS, GoalConditioning
 
-LENGTHS = {"none": 0, "chain": 48, "chain_fk": 57, "chain_fk+jacobian": 109, "chain+dynamics": 76, "dynamics": 28, "random": 28, "embedding": 5} | {
+LENGTHS = {
+    "none": 0,
+    "chain": 48,
+    "chain_fk": 57,
+    "chain_fk+jacobian": 109,
+    "chain+dynamics": 76,
+    "dynamics": 28,
+    "random": 28,
+    "embedding": 5,
+} | {
     "none+end_effector": 3,
     "none+goal_offset": 3,
 }

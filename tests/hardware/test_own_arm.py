@@ -1,0 +1,82 @@
+import json
+
+import numpy as np
+import pytest
+from robot_texts import arm
+
+from hcp_jax import evaluate, robot
+from hcp_jax.hardware.arm import arm_spec, sample_hardware
+from hcp_jax.hardware.arm_pool import make_arm_pool
+from hcp_jax.hardware.chain import read_chain
+from hcp_jax.hardware.own_arm import compare_with, find_nearest, make_own_pool
+from hcp_jax.hardware.pool import RobotPool, robots_path
+from hcp_jax.hardware.ranges import ArmRanges
+from hcp_jax.hardware.robot_file import RobotFile, RobotFileError, read_robot_here
+
+TEMPLATE = robots_path() / "arm_reacher.xml"
+
+
+@pytest.fixture(scope="module")
+def trained() -> RobotPool:
+    return make_arm_pool("reacher", ArmRanges(), ("A", "I"), 3, seed=0)
+
+
+@pytest.fixture(scope="module")
+def one_of_them() -> RobotFile:
+    """Training arm 1 of type A, as if it came from a file."""
+    hardware = {name: values[1] for name, values in sample_hardware(ArmRanges(), "A", 3, seed=0).items()}
+    chain = read_chain(arm_spec("reacher", "A", hardware).compile())
+    return RobotFile(chain, tuple("abcde"), "base", "tip", ())
+
+
+def test_a_training_arm_is_inside_all_ranges_and_its_own_nearest(one_of_them, trained):
+    own = make_own_pool("reacher", one_of_them)
+    robot_type, robot_id, distance = find_nearest(own, trained)
+    assert (robot_type, robot_id) == ("A", trained.robot_id[1])
+    assert distance == pytest.approx(0.0, abs=1e-6)
+    assert all(entry.is_inside for entry in compare_with(own, trained))
+    np.testing.assert_allclose(own.fields["body_mass"][0], trained.fields["body_mass"][1])
+
+
+def test_its_start_poses_are_at_the_points_that_the_reacher_starts_from(one_of_them):
+    own = make_own_pool("reacher", one_of_them)
+    assert own.hardware["start_angles"].shape[1:] == (own.hardware["start_angles"].shape[1], 7)
+    assert own.hardware["start_angles"].shape[1] > 20
+    assert (own.hardware["start_angles"][..., 5:] == 0).all()
+    low, high = np.moveaxis(own.hardware["joint_range"][0, :5], -1, 0)
+    angles = own.hardware["start_angles"][0, :, :5]
+    assert ((angles >= low - 1e-6) & (angles <= high + 1e-6)).all()
+
+
+def test_an_arm_that_reaches_nothing_is_refused(tmp_path):
+    (tmp_path / "short.urdf").write_text(arm(2))
+    short = read_robot_here(tmp_path / "short.urdf", None, None)
+    with pytest.raises(RobotFileError, match="reaches no point that the reacher starts from"):
+        make_own_pool("reacher", short)
+
+
+def test_the_command_says_joints_assumptions_and_what_lies_outside(tmp_path, capsys):
+    robot.main(["check", str(TEMPLATE), "--tip", "l6", "--json", str(tmp_path / "out.json")])
+    shown, record = capsys.readouterr().out, json.loads((tmp_path / "out.json").read_text())
+    assert [joint["name"] for joint in record["joints"]] == [f"j{i}" for i in range(7)]
+    assert record["nearest"]["type"] == "I"
+    assert "nearest training arm: type I" in shown
+    outside = [entry["name"] for entry in record["entries"] if not entry["is_inside"]]
+    assert f"{len(outside)} of {len(record['entries'])} entries" in shown
+
+
+def test_a_policy_is_evaluated_on_ones_own_arm(finished_arms, tmp_path):
+    arguments = ["--robot", str(TEMPLATE), "--tip", "l6", "--trials", "2", "--robots-per-trial", "3"]
+    evaluate.main([str(finished_arms), *arguments, "--json", str(tmp_path / "out.json")])
+    record = json.loads((tmp_path / "out.json").read_text())
+    assert list(record["types"]) == ["arm_reacher"]
+    assert record["types"]["arm_reacher"]["zero_shot"]
+    assert len(record["robots"]) == 6
+
+
+@pytest.mark.parametrize("others", [["--types", "A"], ["--pool", "folder"]])
+def test_ones_own_arm_goes_without_others(others, finished_arms, capsys):
+    with pytest.raises(SystemExit) as exit_info:
+        evaluate.main([str(finished_arms), "--robot", str(TEMPLATE), *others])
+    assert exit_info.value.code == 2
+    assert "--robot: goes with" in capsys.readouterr().err
