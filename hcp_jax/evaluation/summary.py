@@ -17,6 +17,7 @@ ALGORITHM_NAMES = {
     "kinematics+dynamics": "HCP-E+Dyn",
     "chain": "HCP-E",
     "chain_fk": "HCP-E",
+    "chain_fk+jacobian": "HCP-E",
     "chain+dynamics": "HCP-E+Dyn",
     "embedding": "HCP-I",
 }

@@ -3,8 +3,9 @@ import shutil
 
 import pytest
 
-from hcp_jax import collect
+from hcp_jax import collect, evaluate
 from hcp_jax.evaluation.arm_sweeps import evaluate_arms
+from hcp_jax.evaluation.table1 import make_table1
 from hcp_jax.training.metrics import read_rows
 
 
@@ -27,3 +28,17 @@ def test_collected_successes_come_from_the_run_folder(results, finished_arms):
 def test_a_published_arm_policy_moves_as_its_run_does(results, finished_arms):
     records = [evaluate_arms(folder, 1, 2, types=("H",)) for folder in (finished_arms, results / "policies" / "arms_s0")]
     assert records[0]["robots"] == records[1]["robots"]
+
+
+def test_table_1_has_a_row_beside_the_papers_for_what_was_evaluated(results):
+    evaluations = results / "arms" / "evaluations"
+    evaluations.mkdir()
+    arguments = ["--trials", "2", "--robots-per-trial", "3", "--without-robots"]
+    evaluate.main([str(results / "policies" / "arms_s0"), *arguments, "--json", str(evaluations / "arms_s0.json")])
+    (evaluations / "arms_s0_rk4.json").write_text("not read: no run of that name")
+    (row,) = make_table1(results)
+    measured = json.loads((evaluations / "arms_s0.json").read_text())["types"]["H"]
+    assert (row["experiment"], row["algorithm"], row["train_types"], row["test_type"]) == (1, "HCP-E", "AI", "H")
+    assert (row["paper_mean"], row["paper_std"]) == (92.5, 1.96)
+    assert (row["success_mean"], row["control_steps"]) == (round(measured["success_mean"], 2), 320)
+    assert (row["seeds"], row["policy"], row["success_std_over_seeds"]) == ([0], ["arms_s0"], None)

@@ -1,0 +1,77 @@
+"""The paper's table 1 beside ours: zero-shot success on the type left out, one row for each policy that was evaluated."""
+
+import collections
+import json
+import pathlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from hcp_jax.config import ArmConfig, ArmPoolConfig, Config
+from hcp_jax.evaluation.summary import name_algorithm, read_run_commit, read_wall_seconds
+from hcp_jax.training.run_folder import read_config
+
+# (task, hole moves, type left out): experiment of HCP-E (that of DDPG+HER is the next), mean and deviation of each [%].
+PAPER = {
+    ("reacher", False, "H"): (1, (92.5, 1.96), (0.2, 0.4)),
+    ("reacher", False, "E"): (3, (88.0, 2.0), (2.7, 2.19)),
+    ("peg_insertion", False, "H"): (5, (92.2, 2.75), (0.0, 0.0)),
+    ("peg_insertion", False, "E"): (7, (87.6, 2.01), (0.8, 0.6)),
+    ("peg_insertion", False, "I"): (9, (65.6, 3.77), (0.1, 0.3)),
+    ("peg_insertion", True, "H"): (11, (4.1, 1.5), (0.1, 0.3)),
+    ("peg_insertion", True, "E"): (13, (76.1, 3.96), (0.0, 0.0)),
+    ("peg_insertion", True, "I"): (15, (23.5, 4.22), (0.2, 0.4)),
+}
+
+
+def make_table1(results: pathlib.Path) -> list[dict]:
+    """Rows from `arms/evaluations/NAME_sSEED.json`, which `evaluate results/policies/NAME_sSEED --json` wrote, and from
+    `arms/runs`: experiment, task, train_types, test_type, algorithm, encoding, seeds, success_mean, success_std_over_trials (mean
+    over seeds), success_std_over_seeds, reachable_success_mean, control_steps, wall_seconds, paper_mean, paper_std (of HCP-E for
+    every v_h, of DDPG+HER for none, None for controls), policy (names), commit. In percent; sorted by experiment."""
+    groups: dict[str, list[tuple[str, dict, Config]]] = collections.defaultdict(list)
+    for path in sorted((results / "arms" / "evaluations").glob("*.json")):
+        folder = results / "arms" / "runs" / path.stem
+        if folder.is_dir():  # of a whole run: others have another name
+            record, config = json.loads(path.read_text()), read_config(folder)
+            assert isinstance(config.pool, ArmPoolConfig)
+            if len(config.pool.left_out) == 1 and config.pool.left_out[0] in record["types"]:
+                groups[config.name].append((path.stem, record, config))
+    rows = [make_row(runs, results) for runs in groups.values()]
+    return sorted(rows, key=lambda row: (row["experiment"] or 99, row["task"], row["encoding"]))
+
+
+def make_row(runs: Sequence[tuple[str, dict, Config]], results: pathlib.Path) -> dict:
+    """The row of one experiment's seeds: (policy, record, config) of each."""
+    config = runs[0][2]
+    assert isinstance(config.pool, ArmPoolConfig)
+    assert isinstance(config.env, ArmConfig)
+    test_type = config.pool.left_out[0]
+    measured = [record["types"][test_type] for _, record, _ in runs]
+    folders = [results / "arms" / "runs" / name for name, _, _ in runs]
+    of_paper = PAPER.get((config.task, config.env.random_hole > 0, test_type))
+    experiment = paper = None
+    if of_paper and not config.encoding.startswith("none+"):  # those are ours alone
+        is_baseline = config.encoding == "none"
+        experiment, paper = of_paper[0] + is_baseline, of_paper[1 + is_baseline]
+    means = np.asarray([row["success_mean"] for row in measured])
+    reachable = [row["reachable_success_mean"] for row in measured if row["reachable_success_mean"] is not None]
+    return {
+        "experiment": experiment,
+        "task": config.task,
+        "train_types": "".join(config.pool.types),
+        "test_type": test_type,
+        "algorithm": name_algorithm(config),
+        "encoding": config.encoding,
+        "seeds": sorted(config.seed for _, _, config in runs),
+        "success_mean": round(float(means.mean()), 2),
+        "success_std_over_trials": round(float(np.mean([row["success_std"] for row in measured])), 2),
+        "success_std_over_seeds": round(float(means.std()), 2) if len(runs) > 1 else None,
+        "reachable_success_mean": round(float(np.mean(reachable)), 2) if reachable else None,
+        "control_steps": runs[0][1]["checkpoint_env_steps"],
+        "wall_seconds": round(float(np.mean([read_wall_seconds(folder) for folder in folders])), 1),
+        "paper_mean": paper and paper[0],
+        "paper_std": paper and paper[1],
+        "policy": [name for name, _, _ in runs],
+        "commit": sorted({read_run_commit(folder) for folder in folders}),
+    }
