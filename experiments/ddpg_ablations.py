@@ -19,7 +19,13 @@ CHANGES = {
     },
     "without_stop_at_success": {"stop_at_success": PAPER.stop_at_success},
     "without_learning_rate_decay": {"learning_rate_decay": PAPER.learning_rate_decay},
-    "with_the_papers_batch_size": {"batch_size": PAPER.batch_size},
+    # As many samples in all.
+    "with_the_papers_batch_size": {
+        "batch_size": PAPER.batch_size,
+        "updates_per_iteration": presets.FAST_DDPG.updates_per_iteration * presets.FAST_DDPG.batch_size // PAPER.batch_size,
+        "tau": PAPER.tau,
+    },
+    "without_failing_share": {"failing_share": PAPER.failing_share},
 }
 
 

@@ -17,6 +17,7 @@ ALGORITHM_OF = {"hopper": "ppo", "reacher": "ddpg", "peg_insertion": "ddpg"}
 ARM_CONDITIONINGS = (*ARM_ENCODINGS, "chain_fk", "chain_fk+jacobian", "none+end_effector", "none+goal_offset", "embedding")
 INIT_LAYERS = ("hidden", "all")
 RELABEL_STRATEGIES = ("future", "final", "none")
+NETWORKS = ("flat", "joints")
 
 
 class ConfigError(ValueError):
@@ -215,7 +216,10 @@ class DDPGConfig:
 
     Attributes:
         preset: name of the set of values that this one started from.
-        hidden_sizes: widths of the hidden layers of actor and critic; the action enters the critic at the second.
+        network: `flat`, one vector through one actor and one critic (paper); or `joints`, layers shared by all joints, for the
+            encoding `chain_fk+jacobian`.
+        hidden_sizes: widths of the hidden layers of actor and critic; the action enters the critic at the second. Of `joints`:
+            the first is that of the layers over each joint, the others the critic's after them.
         actor_learning_rate, critic_learning_rate: Adam's steps.
         learning_rate_decay: of all steps: their factor at the end of the run, reached linearly.
         critic_weight_decay: L2 penalty on the critic's kernels.
@@ -243,6 +247,7 @@ class DDPGConfig:
     """
 
     preset: str = "paper"
+    network: str = "flat"
     hidden_sizes: tuple[int, ...] = (128, 256, 256)
     actor_learning_rate: float = 1e-4
     critic_learning_rate: float = 1e-4
@@ -282,6 +287,7 @@ class DDPGConfig:
             _require(0.0 <= getattr(self, name) <= 1.0, f"ddpg.{name}", getattr(self, name), "a number in [0, 1]")
         for name in ("actor_average", "exploration_correlation"):
             _require(0.0 <= getattr(self, name) < 1.0, f"ddpg.{name}", getattr(self, name), "a number in [0, 1)")
+        _require(self.network in NETWORKS, "ddpg.network", self.network, f"one of {', '.join(NETWORKS)}")
         _require(self.relabel in RELABEL_STRATEGIES, "ddpg.relabel", self.relabel, f"one of {', '.join(RELABEL_STRATEGIES)}")
         sizes = self.hidden_sizes
         _require(len(sizes) >= 2 and min(sizes) >= 1, "ddpg.hidden_sizes", sizes, "at least two sizes of at least 1")
@@ -399,6 +405,10 @@ class Config:
             )
 
     def _check_buffer(self) -> None:
+        if self.ddpg.network == "joints":
+            _require(
+                self.encoding == "chain_fk+jacobian", "encoding", self.encoding, "chain_fk+jacobian for ddpg.network=joints"
+            )
         if self.ddpg.buffer_episodes < self.resolved_num_envs:
             raise ConfigError(
                 f"ddpg.buffer_episodes={self.ddpg.buffer_episodes}: must hold one iteration's {self.resolved_num_envs} episodes"

@@ -25,7 +25,7 @@ from hcp_jax.algorithms.replay import EpisodeBatch, Replay, StepSample, add_epis
 from hcp_jax.config import DDPGConfig
 from hcp_jax.devices import split_rows
 from hcp_jax.envs.goal import GoalState, GoalTransition
-from hcp_jax.policies.networks import Critic, DeterministicActor
+from hcp_jax.policies.networks import Critic, DeterministicActor, JointActor, JointCritic
 
 Params = dict[str, Any]  # {"actor": ..., "critic": ... with a leading axis of critics, "embedding": [N, K] or None}
 
@@ -112,8 +112,12 @@ class DDPG:
         embedding_learning_rate: Adam's step for a learned v_h.
         """
         self.env, self.conditioning, self.config, self.num_envs = env, conditioning, config, num_envs
-        self.actor = DeterministicActor(config.hidden_sizes, env.action_size, config.layer_norm)
-        self.critic = Critic(config.hidden_sizes, config.layer_norm)
+        if config.network == "joints":
+            self.actor = JointActor(config.hidden_sizes, config.layer_norm)
+            self.critic = JointCritic(config.hidden_sizes, config.layer_norm)
+        else:
+            self.actor = DeterministicActor(config.hidden_sizes, env.action_size, config.layer_norm)
+            self.critic = Critic(config.hidden_sizes, config.layer_norm)
         weight_decay = optax.add_decayed_weights(config.critic_weight_decay, mask=mark_kernels)
         self._num_iterations = num_iterations
         num_updates = num_iterations * config.updates_per_iteration

@@ -25,10 +25,17 @@ PAPER = {
 
 
 def make_table1(results: pathlib.Path) -> list[dict]:
-    """Rows from `arms/evaluations/NAME_sSEED.json`, which `evaluate results/policies/NAME_sSEED --json` wrote, and from
-    `arms/runs`: experiment, task, train_types, test_type, algorithm, encoding, seeds, success_mean, success_std_over_trials (mean
-    over seeds), success_std_over_seeds, reachable_success_mean, control_steps, wall_seconds, paper_mean, paper_std (of HCP-E for
-    every v_h, of DDPG+HER for none, None for controls), policy (names), commit. In percent; sorted by experiment."""
+    """One row for each experiment, sorted by the paper's number.
+
+    Args:
+        results: folder with `arms/evaluations/NAME_sSEED.json`, as `evaluate results/policies/NAME_sSEED --json` writes them, and
+            with `arms/runs`.
+
+    Returns:
+        rows of experiment, task, train_types, test_type, algorithm, encoding, seeds, success_mean, success_std_over_trials (mean
+        over seeds), success_std_over_seeds, reachable_success_mean, control_steps, wall_seconds, paper_mean and paper_std (of
+        HCP-E for every v_h, of DDPG+HER for none, None for controls), policy (names), commit. Success in percent.
+    """
     groups: dict[str, list[tuple[str, dict, Config]]] = collections.defaultdict(list)
     for path in sorted((results / "arms" / "evaluations").glob("*.json")):
         folder = results / "arms" / "runs" / path.stem

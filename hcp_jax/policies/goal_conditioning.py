@@ -15,6 +15,7 @@ tolerance is 2 cm.
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS, encode_arms
 from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
@@ -96,6 +97,17 @@ class GoalConditioning:
             towards += [jnp.einsum("...ij,...j->...i", jacobian, soft_direction(goal - end_effector))]
         flat = (*angles.shape[:-1], -1)
         return {"robot": [part.reshape(flat) for part in robot], "goal": towards}
+
+
+def split_joints(inputs: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """The inputs of `chain_fk+jacobian` [..., 126] as what belongs to each joint [..., 7, 15] and the rest [..., 21]."""
+    sizes = (7, 7, 3, 21, 21, 3, 9, 21, 21, 3, 3, 7)
+    parts = jnp.split(inputs, np.cumsum(sizes)[:-1], axis=-1)
+    angles, velocities, goal, anchors, axes, position, rotation, jacobian, turns, velocity, offset, towards = parts
+    vectors = [part.reshape((*part.shape[:-1], 7, 3)) for part in (anchors, axes, jacobian, turns)]
+    scalars = [part[..., None] for part in (angles, velocities, towards)]
+    rest = jnp.concatenate([goal, position, rotation, velocity, offset], axis=-1)
+    return jnp.concatenate([*scalars, *vectors], axis=-1), rest
 
 
 def scale_offset(offset: jax.Array) -> jax.Array:

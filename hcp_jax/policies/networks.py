@@ -6,6 +6,8 @@ import jax
 import jax.numpy as jnp
 from flax import linen as nn
 
+from hcp_jax.policies.goal_conditioning import split_joints
+
 
 class MLP(nn.Module):
     """SELU layers of `hidden_sizes`, then a linear layer of `output_size` (paper, appendix "Hopper")."""
@@ -95,3 +97,58 @@ def selu_layer(x: jax.Array, size: int, name: str, layer_norm: bool) -> jax.Arra
     """A dense layer with SELU, and LayerNorm without scale and bias before it if asked. Call inside a compact module."""
     x = nn.Dense(size, name=name)(x)
     return nn.selu(nn.LayerNorm(use_scale=False, use_bias=False, name=f"{name}_norm")(x) if layer_norm else x)
+
+
+class JointActor(nn.Module):
+    """A deterministic policy whose layers are the same for every joint: they see it, its place, and a summary of all.
+
+    Takes the inputs of `chain_fk+jacobian` [..., 126], and gives an action for each joint [..., 7].
+    """
+
+    hidden_sizes: Sequence[int]
+    layer_norm: bool = False
+
+    @nn.compact
+    def __call__(self, inputs: jax.Array) -> jax.Array:
+        joints, rest = split_joints(inputs)
+        x, summary = encode_joints(joints, rest, self.hidden_sizes, self.layer_norm)
+        x = jnp.concatenate([x, beside_each(x, jnp.concatenate([summary, rest], axis=-1))], axis=-1)
+        x = selu_layer(x, self.hidden_sizes[0], "each", self.layer_norm)
+        init = nn.initializers.variance_scaling(1e-4, "fan_in", "truncated_normal")
+        return jnp.tanh(nn.Dense(1, kernel_init=init, name="output")(x)[..., 0])
+
+
+class JointCritic(nn.Module):
+    """Action values from layers that are the same for every joint, whose action each sees, and a summary of them: [...]."""
+
+    hidden_sizes: Sequence[int]
+    layer_norm: bool = False
+
+    @nn.compact
+    def __call__(self, inputs: jax.Array, action: jax.Array) -> jax.Array:
+        joints, rest = split_joints(inputs)
+        joints = jnp.concatenate([joints, action[..., None]], axis=-1)
+        _, summary = encode_joints(joints, rest, self.hidden_sizes, self.layer_norm)
+        x = jnp.concatenate([summary, rest], axis=-1)
+        for i, size in enumerate(self.hidden_sizes[1:]):
+            x = selu_layer(x, size, f"hidden_{i}", self.layer_norm)
+        init = nn.initializers.variance_scaling(1e-4, "fan_in", "truncated_normal")
+        return nn.Dense(1, kernel_init=init, name="output")(x)[..., 0]
+
+
+def encode_joints(
+    joints: jax.Array, rest: jax.Array, hidden_sizes: Sequence[int], layer_norm: bool
+) -> tuple[jax.Array, jax.Array]:
+    """Two layers over each joint, with its place in the chain and the rest beside it: [..., 7, W], and their mean over the
+    joints. Call inside a compact module."""
+    num_joints = joints.shape[-2]
+    place = jnp.broadcast_to(jnp.eye(num_joints), (*joints.shape[:-1], num_joints))
+    x = jnp.concatenate([joints, place, beside_each(joints, rest)], axis=-1)
+    for i in range(2):
+        x = selu_layer(x, hidden_sizes[0], f"joint_{i}", layer_norm)
+    return x, jnp.mean(x, axis=-2)
+
+
+def beside_each(joints: jax.Array, values: jax.Array) -> jax.Array:
+    """`values` [..., R] once for each joint: [..., 7, R]."""
+    return jnp.broadcast_to(values[..., None, :], (*joints.shape[:-1], values.shape[-1]))
