@@ -32,9 +32,10 @@ def make_table1(results: pathlib.Path) -> list[dict]:
             with `arms/runs`.
 
     Returns:
-        rows of experiment, task, train_types, test_type, algorithm, encoding, seeds, success_mean, success_std_over_trials (mean
-        over seeds), success_std_over_seeds, reachable_success_mean, control_steps, wall_seconds, paper_mean and paper_std (of
-        HCP-E for every v_h, of DDPG+HER for none, None for controls), policy (names), commit. Success in percent.
+        rows of experiment, task, train_types, test_type, algorithm, encoding, network, seeds, success_mean,
+        success_std_over_trials (mean over seeds), success_std_over_seeds, reachable_success_mean, control_steps, wall_seconds,
+        paper_mean and paper_std (of HCP-E for every v_h, of DDPG+HER for none, None for controls), policy (names), commit.
+        Success in percent.
     """
     groups: dict[str, list[tuple[str, dict, Config]]] = collections.defaultdict(list)
     for path in sorted((results / "arms" / "evaluations").glob("*.json")):
@@ -70,6 +71,7 @@ def make_row(runs: Sequence[tuple[str, dict, Config]], results: pathlib.Path) ->
         "test_type": test_type,
         "algorithm": name_algorithm(config),
         "encoding": config.encoding,
+        "network": config.ddpg.network,
         "seeds": sorted(config.seed for _, _, config in runs),
         "success_mean": round(float(means.mean()), 2),
         "success_std_over_trials": round(float(np.mean([row["success_std"] for row in measured])), 2),
