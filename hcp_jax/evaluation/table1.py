@@ -28,8 +28,8 @@ def make_table1(results: pathlib.Path) -> list[dict]:
     """One row for each experiment, sorted by the paper's number.
 
     Args:
-        results: folder with `arms/evaluations/NAME_sSEED.json`, as `evaluate results/policies/NAME_sSEED --json` writes them, and
-            with `arms/runs`.
+        results: folder with `arms/runs` and with `arms/evaluations/NAME_sSEED.json`, as `evaluate results/policies/NAME_sSEED
+            --json` writes them.
 
     Returns:
         rows of experiment, task, train_types, test_type, algorithm, encoding, network, seeds, success_mean,
