@@ -1,4 +1,7 @@
-"""On 2 and 4 devices training comes out as on one, and each robot is stepped once. Each count is a process of its own."""
+"""On 2 and 4 devices training comes out as on one, and each robot is stepped once. Each count is a process of its own.
+
+`pytest -m slow tests/test_devices.py`
+"""
 
 import json
 import os
@@ -7,6 +10,8 @@ import sys
 
 import numpy as np
 import pytest
+
+pytestmark = pytest.mark.slow
 
 SCRIPT = """
 import json, sys
@@ -60,9 +65,7 @@ def train_on(num_devices: int, names: tuple[str, ...]) -> dict:
     return json.loads(done.stdout)
 
 
-@pytest.mark.parametrize(
-    ("num_devices", "names"), [(2, ("arms",)), pytest.param(4, ("hopper", "arms", "mjx"), marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("num_devices", "names"), [(2, ("arms",)), (4, ("hopper", "arms", "mjx"))])
 def test_training_on_several_devices_comes_out_as_on_one(num_devices, names):
     on_one, on_many = (train_on(count, names) for count in (1, num_devices))
     assert (on_one["devices"], on_many["devices"]) == (1, num_devices)

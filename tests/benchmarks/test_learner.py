@@ -12,9 +12,10 @@ from hcp_jax import benchmark
             "presets.arm('a', 'reacher', 'chain_fk', num_envs=4, pool=ArmPoolConfig(('I',), (), 2))",
             ["--config.ddpg.updates_per_iteration=20", "--config.env.episode_length=10", "--config.ddpg.buffer_episodes=8"],
         ),
-        (
+        pytest.param(
             "presets.hopper('a', 'kinematics', num_envs=8, pool=PoolConfig(num_robots=4))",
             ["--config.ppo.unroll_length=8", "--config.ppo.num_minibatches=4"],
+            marks=pytest.mark.slow,
         ),
     ],
 )

@@ -34,12 +34,13 @@ def test_gradient_samples_are_epochs_of_ppo_and_drawn_steps_of_ddpg():
 
 
 def test_rows_of_other_tasks_are_left_out():
-    rows = list(benchmark_training(REACHER, ["hcp_jax", "sb3-ppo", "brax-ppo"], seconds=0.01))
-    assert [row["name"] for row in rows] == ["hcp_jax"]
-    assert rows[0]["control_steps_per_second"] > 0
+    assert not list(benchmark_training(REACHER, ["sb3-ppo", "brax-ppo"], seconds=0.01))
+    assert not list(benchmark_training(HOPPER, ["sb3-her"], seconds=0.01))
 
 
+@pytest.mark.slow
 def test_stable_baselines3_learns_on_our_worlds_beside_us():
+    """pytest -m slow tests/benchmarks, with the extra `bench`"""
     pytest.importorskip("stable_baselines3")
     rows = list(benchmark_training(REACHER, ["hcp_jax", "sb3-her"], seconds=0.01))
     assert [row["name"] for row in rows] == ["hcp_jax", "sb3-her"]

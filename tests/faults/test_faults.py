@@ -1,6 +1,6 @@
 """What can happen to a run over night, and what is lost: nothing but the work since the last checkpoint, and not the result.
 
-`pytest -m slow -s tests/faults` (about 15 minutes on 2 idle cores); `-s` shows the table of what each kill lost.
+`pytest -n 0 -m slow -s tests/faults`; `-s` shows what each kill lost.
 """
 
 import dataclasses
