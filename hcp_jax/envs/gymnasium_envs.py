@@ -115,11 +115,14 @@ class PoolVectorEnv(_VectorEnv):
 
 @struct.dataclass
 class GoalWorlds:
-    """State of B worlds of a goal task: goal, the environment's; index: [B] int32; step_count: [B] int32 of each episode."""
+    """State of B worlds of a goal task: goal, the environment's; step_count: [B] int32 of each episode."""
 
     goal: GoalState
-    index: jax.Array
     step_count: jax.Array
+
+    @property
+    def index(self) -> jax.Array:
+        return self.goal.index
 
 
 class GoalVectorEnv(_VectorEnv):
@@ -144,7 +147,7 @@ class GoalVectorEnv(_VectorEnv):
 
     def _reset_worlds(self, key):
         state = self._draw(key)
-        return GoalWorlds(state, state.index, jnp.zeros(self.num_envs, jnp.int32)), self._observe(state)
+        return GoalWorlds(state, jnp.zeros(self.num_envs, jnp.int32)), self._observe(state)
 
     def _step_worlds(self, worlds, action):
         state, transition = self.env.step(worlds.goal, action)
@@ -155,7 +158,7 @@ class GoalVectorEnv(_VectorEnv):
         key, key_draw = jax.random.split(state.key)
         fresh = self._draw(key_draw)
         following = select_rows(done, fresh.replace(key=None), state.replace(key=None)).replace(key=key)
-        return GoalWorlds(following, following.index, jnp.where(done, 0, step_count)), {
+        return GoalWorlds(following, jnp.where(done, 0, step_count)), {
             "obs": self._observe(following),
             "reward": transition.reward,
             "terminated": terminated,
