@@ -1,5 +1,7 @@
+import itertools
 import json
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from robot_texts import arm
@@ -8,10 +10,12 @@ from hcp_jax import evaluate, robot
 from hcp_jax.hardware.arm import arm_spec, sample_hardware
 from hcp_jax.hardware.arm_pool import make_arm_pool
 from hcp_jax.hardware.chain import read_chain
+from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
 from hcp_jax.hardware.own_arm import compare_with, find_nearest, make_own_pool
 from hcp_jax.hardware.pool import RobotPool, robots_path
 from hcp_jax.hardware.ranges import ArmRanges
 from hcp_jax.hardware.robot_file import RobotFile, RobotFileError, read_robot_here
+from hcp_jax.hardware.start_poses import GRID
 
 TEMPLATE = robots_path() / "arm_reacher.xml"
 
@@ -40,9 +44,15 @@ def test_a_training_arm_is_inside_all_ranges_and_its_own_nearest(one_of_them, tr
 
 def test_its_start_poses_are_at_the_points_that_the_reacher_starts_from(one_of_them):
     own = make_own_pool("reacher", one_of_them)
-    assert own.hardware["start_angles"].shape[1:] == (own.hardware["start_angles"].shape[1], 7)
-    assert own.hardware["start_angles"].shape[1] > 20
-    assert (own.hardware["start_angles"][..., 5:] == 0).all()
+    poses = own.hardware["start_angles"][0]
+    assert len(poses) > 20
+    assert (poses[:, 5:] == 0).all()
+    rotations = quat_to_matrix(jnp.asarray(own.hardware["chain_quat"][0]))
+    reached = jnp.stack(
+        [joint_poses(jnp.asarray(own.hardware["chain_pos"][0]), rotations, q)[0][-1] for q in jnp.asarray(poses)]
+    )
+    points = jnp.asarray(list(itertools.product(*GRID)))
+    assert float(jnp.linalg.norm(reached[:, None] - points, axis=-1).min(axis=1).max()) < 0.011
     low, high = np.moveaxis(own.hardware["joint_range"][0, :5], -1, 0)
     angles = own.hardware["start_angles"][0, :, :5]
     assert ((angles >= low - 1e-6) & (angles <= high + 1e-6)).all()
