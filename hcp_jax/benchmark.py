@@ -52,9 +52,8 @@ def main(arguments: list[str] | None = None) -> None:
         rows = []
         for row in measure(options, config):
             rows.append(row)
-            print(
-                "  ".join(f"{name} {value:,}" if isinstance(value, (int, float)) else str(value) for name, value in row.items())
-            )
+            numbers = (f"{name} {value:,}" for name, value in row.items() if isinstance(value, (int, float)))
+            print(row["name"], *numbers, sep="  ", flush=True)
         if options.subject == "physics":
             print_speeds(config.name, rows)
         else:
