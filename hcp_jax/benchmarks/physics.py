@@ -8,6 +8,7 @@
 | `rollout` | the same on the default engine, with the experiment's policy in the loop |
 """
 
+import functools
 import os
 import statistics
 import time
@@ -28,6 +29,8 @@ from hcp_jax.physics.native import MJ_INTEGRATORS
 ENGINES = ("native", "mjx-warp", "mjx-jax")
 ROWS = ("mj_step", "mujoco.batch", *ENGINES, "rollout")
 REPEATS = 3
+# Fused as XLA does by default on a CPU, the kinematics of a chain of seven joints take 5 s instead of 1 ms (jax 0.10, 8 arms).
+_MJX_JAX_ON_CPU = {"xla_cpu_use_fusion_emitters": False}
 
 
 def benchmark_physics(config: Config, batches: list[int], rows: list[str], seconds: float) -> Iterator[dict]:
@@ -67,7 +70,8 @@ def benchmark_physics(config: Config, batches: list[int], rows: list[str], secon
 
 def time_steps(steps: Callable[[int], None], seconds: float) -> tuple[float, int]:
     """Batched control steps per second of `steps(n)`, and the n that takes at least `seconds`."""
-    steps(1)  # compiles
+    for _ in range(2):
+        steps(1)  # compiles, and once more for arrays that are placed as a first call returned them
     count, elapsed = 1, time_call(steps, 1)
     while elapsed < seconds:
         count = max(2 * count, int(1.2 * count * seconds / max(elapsed, 1e-3)))
@@ -87,7 +91,9 @@ def make_rollout(run: ArmExperiment | HopperExperiment, engine: str, num_envs: i
     env, index = run.make_env(run.train_pool, engine), jnp.arange(num_envs, dtype=jnp.int32) % run.train_pool.num_robots
     policy = make_policy(run) if with_policy else None
 
-    @jax.jit
+    options = _MJX_JAX_ON_CPU if engine == "mjx-jax" and jax.default_backend() == "cpu" else None
+
+    @functools.partial(jax.jit, compiler_options=options)
     def play(state, key, count):
         def step(_, carry):
             state, key = carry
