@@ -20,12 +20,16 @@ def find_runs(runs: pathlib.Path) -> list[pathlib.Path]:
     return sorted(path.parent for path in runs.glob(f"*/{CONFIG_FILE}") if (path.parent / METRICS_FILE).exists())
 
 
-def publish_runs(folders: Sequence[pathlib.Path], out: pathlib.Path, policies: pathlib.Path) -> str:
-    """Copies each run's metrics to `out/runs` and writes its policy to `policies`."""
+def publish_runs(folders: Sequence[pathlib.Path], out: pathlib.Path, policies: pathlib.Path) -> list[pathlib.Path]:
+    """Copies each run's metrics to `out/runs` and writes its policy to `policies`.
+
+    Returns:
+        all folders of `out/runs`, those of earlier calls too: what tables and curves are made of.
+    """
     for folder in folders:
         copy_files(folder, out / "runs" / folder.name, (CONFIG_FILE, ENVIRONMENT_FILE, METRICS_FILE, TIMING_FILE))
         publish_policy(folder, policies / folder.name)
-    return f"{out}/runs, {policies}: {', '.join(folder.name for folder in folders)}"
+    return find_runs(out / "runs")
 
 
 def group_by_name(folders: Sequence[pathlib.Path]) -> dict[str, list[pathlib.Path]]:

@@ -42,3 +42,13 @@ def test_table_1_has_a_row_beside_the_papers_for_what_was_evaluated(results):
     assert (row["paper_mean"], row["paper_std"]) == (92.5, 1.96)
     assert (row["success_mean"], row["control_steps"]) == (round(measured["success_mean"], 2), 320)
     assert (row["seeds"], row["policy"], row["success_std_over_seeds"]) == ([0], ["arms_s0"], None)
+
+
+def test_a_run_that_is_collected_later_is_added_to_those_before(results, finished_arms, tmp_path):
+    shutil.copytree(finished_arms, tmp_path / "runs" / "arms_s1")
+    config = json.loads((finished_arms / "config.json").read_text()) | {"seed": 1}
+    (tmp_path / "runs" / "arms_s1" / "config.json").write_text(json.dumps(config))
+    shutil.copytree(results, tmp_path / "results")
+    collect.main([str(tmp_path / "runs"), "--out", str(tmp_path / "results")])
+    (row,) = json.loads((tmp_path / "results" / "arms" / "summary.json").read_text())
+    assert row["seeds"] == [0, 1]
