@@ -114,7 +114,8 @@ def split_types(pool: RobotPool, types: Sequence[str]) -> dict[str, RobotPool]:
 
 
 def summarise_type(episodes: GoalEpisodes, reachable: np.ndarray, stuck: np.ndarray, trials: int) -> dict:
-    """Success over trials, over the goals that the arm can reach at all, and over the arms that can move all their joints."""
+    """Success over trials, over the goals that the arm can reach at all, and over the arms that can move all their joints;
+    final distance [m] and length of each episode, for distributions."""
 
     def percent(chosen: np.ndarray) -> float | None:
         return 100.0 * float(episodes.success[chosen].mean()) if chosen.any() else None
@@ -129,6 +130,8 @@ def summarise_type(episodes: GoalEpisodes, reachable: np.ndarray, stuck: np.ndar
         "immovable_share": 100.0 * float(stuck.mean()),
         "final_distance_quantiles": {f"{q:g}": float(np.quantile(episodes.final_distance, q)) for q in QUANTILES},
         "episode_length_mean": float(episodes.episode_length.mean()),
+        "final_distances": np.round(np.asarray(episodes.final_distance, np.float64), 4).tolist(),
+        "episode_lengths": np.asarray(episodes.episode_length).tolist(),
     }
 
 

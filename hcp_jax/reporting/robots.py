@@ -1,0 +1,81 @@
+"""Sketches of the robots, from their kinematics."""
+
+import jax
+import mujoco
+import numpy as np
+from matplotlib.axes import Axes
+
+from hcp_jax.hardware.arm import OTHER_ARMS, REMOVED_JOINTS, arm_spec
+from hcp_jax.hardware.chain import MAX_JOINTS, read_chain
+from hcp_jax.hardware.hopper import JOINTS, LINKS, TEMPLATE
+from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
+from hcp_jax.hardware.pool import robots_path
+from hcp_jax.hardware.start_poses import start_angles
+from hcp_jax.reporting.plots import render
+
+_START = 37  # of the reacher's start poses: one in the middle of their box
+_AXIS_LENGTH = 0.09  # [m] of the lines that show how joints turn
+_SIZE = (3.0, 3.0)  # [inch]
+
+
+def arm_pose(robot_type: str) -> tuple[np.ndarray, np.ndarray]:
+    """The nominal arm of a type in one of the reacher's start poses, its missing joints at 0.
+
+    Returns:
+        positions [n + 1, 3] m of its n joints and of the peg's tip, and the joints' axes [n, 3].
+    """
+    chain = read_chain(arm_spec("peg_insertion", robot_type).compile())
+    rotation = quat_to_matrix(chain.padded("quat").astype(np.float32))
+    angles = start_angles("reacher", robot_type)[_START]
+    positions, rotations = jax.device_get(joint_poses(chain.padded("pos"), rotation, angles))
+    joints = chain.num_joints
+    return positions[: joints + 1], rotations[:joints, :, 2]
+
+
+def draw_arm(robot_type: str) -> str:
+    """A ring at each joint, a line along its axis, a dot at the peg's tip; metres."""
+    positions, axes_of_joints = arm_pose(robot_type)
+
+    def draw(axes: Axes) -> None:
+        path = np.concatenate([[[0.0, 0.0, 0.0]], positions])
+        axes.plot(*path.T, color="#555555", linewidth=4, solid_capstyle="round", alpha=0.7)
+        for position, axis in zip(positions, axes_of_joints, strict=False):
+            ends = np.stack([position - _AXIS_LENGTH * axis, position + _AXIS_LENGTH * axis])
+            axes.plot(*ends.T, color="#D55E00", linewidth=1.2)
+        axes.plot(*positions[:-1].T, "o", markersize=7, markerfacecolor="white", markeredgecolor="black")
+        axes.plot(*positions[-1:].T, "o", markersize=5, color="#0072B2")
+        axes.set(xlim=(-0.2, 0.8), ylim=(-0.5, 0.5), zlim=(0.0, 1.0), xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+        axes.set(xticks=(0, 0.5), yticks=(-0.5, 0, 0.5), zticks=(0, 0.5, 1))
+        axes.view_init(elev=18, azim=-60)
+
+    return render(draw, _SIZE, "3d")
+
+
+def describe_arm(robot_type: str) -> str:
+    """`A: 5 joints, without j2, j4`."""
+    removed = REMOVED_JOINTS[robot_type]
+    joints = MAX_JOINTS - len(removed)
+    template = {"J": "another arm, without sideways offsets; ", "K": "Fetch; "}.get(robot_type, "")
+    without = f", without {', '.join(removed)}" if removed and robot_type not in OTHER_ARMS else ""
+    return f"{robot_type}: {template}{joints} joints{without}"
+
+
+def draw_hopper() -> str:
+    """The nominal hopper from the side: its links as thick as they are, a ring at each joint; metres."""
+    model = mujoco.MjModel.from_xml_path(str(robots_path() / TEMPLATE))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+
+    def draw(axes: Axes) -> None:
+        for link in LINKS:
+            geom = model.geom(link).id
+            radius, half = model.geom_size[geom, :2]
+            along = data.geom_xmat[geom].reshape(3, 3)[:, 2] * half
+            ends = np.stack([data.geom_xpos[geom] - along, data.geom_xpos[geom] + along])
+            # [points]: 72 an inch, and an inch shows half a metre.
+            axes.plot(ends[:, 0], ends[:, 2], color="#999999", linewidth=2 * radius * 72 / 0.5, solid_capstyle="round")
+        anchors = data.xanchor[[model.joint(name).id for name in JOINTS]]
+        axes.plot(anchors[:, 0], anchors[:, 2], "o", markersize=6, markerfacecolor="white", markeredgecolor="black")
+        axes.set(xlim=(-0.7, 0.7), ylim=(0.0, 1.5), xlabel="x [m]", ylabel="z [m]", aspect="equal")
+
+    return render(draw, _SIZE)

@@ -1,0 +1,202 @@
+"""The paper's tables beside ours."""
+
+from collections.abc import Sequence
+
+from hcp_jax.evaluation.appendix import PAPER_OTHER_ARMS, PAPER_TYPES, paper_by_type
+from hcp_jax.evaluation.records import TableRow, read_learning_curve
+from hcp_jax.hardware.arm import OTHER_ARMS
+from hcp_jax.reporting.page import Item, Row, Section, Table
+from hcp_jax.reporting.published import Published
+from hcp_jax.reporting.settings import (
+    EVALUATE_COMMAND,
+    RESULTS_COMMANDS,
+    SETTINGS,
+    TABLES_COMMAND,
+    TASKS,
+    Setting,
+    roman,
+)
+
+COMMANDS = (*RESULTS_COMMANDS, EVALUATE_COMMAND.format(name="POLICY"), TABLES_COMMAND)
+ALGORITHMS = (("HCP-E", "hcpe"), ("DDPG+HER", "ddpg"))  # of the paper's pairs, with their files' names
+NOT_RUN = "not run"
+
+
+def table_sections(published: Published) -> tuple[Section, ...]:
+    """Table 1 with our controls, and the appendix's tables by type."""
+    rows, by_type = published.table("table1.json"), published.table("appendix.json")
+    table1 = Section(
+        "table1",
+        "Table 1: zero-shot success on a type that was not trained on",
+        (make_table1(published, rows), make_controls(published, rows)),
+        "Success in percent on new arms of the type left out: mean and standard deviation over trials of 100 arms, then "
+        "averaged over seeds. A goal counts as reachable if inverse kinematics within joint limits finds joint angles for it.",
+    )
+    appendix = Section(
+        "types",
+        "Appendix tables: success on the types trained on",
+        (*(make_types(published, by_type, task) for task in TASKS), make_other_arms(published, by_type)),
+        "New arms of the types trained on, and arms of two other templates. The paper heads the columns of Exp. VII and VIII A "
+        "to G and I, though these left E out; here they are read in order, as A to D and F to I.",
+    )
+    return table1, appendix
+
+
+def make_table1(published: Published, rows: Sequence[TableRow]) -> Item:
+    """The sixteen experiments in the paper's order; an experiment with several v_h has a row for each."""
+    columns = ("Exp.", "task", "trained on", "tested on", "algorithm", "v_h", "ours [%]", "paper [%]", "difference", "seeds")
+    columns += ("std over seeds", "of reachable goals [%]", "control steps [M]", "minutes", "policies, or the training")
+    lines = []
+    for setting in SETTINGS:
+        trained = letters(name for name in PAPER_TYPES if name != setting.left_out)
+        for number, (algorithm, file) in enumerate(ALGORITHMS):
+            experiment, paper = setting.experiment + number, setting.paper[number]
+            first = (roman(experiment), setting.task, trained, setting.left_out)
+            measured = [row for row in rows if row.experiment == experiment]
+            lines += [Row((*first, row.algorithm, name_inputs(row), *measurements(row))) for row in measured]
+            if not measured:
+                name = setting.experiment_name(file)
+                cells = (describe_progress(published, name), spread(*paper), *[""] * 6)
+                command = f"python -m hcp_jax.train --config experiments/{name}.py"
+                lines.append(Row((*first, algorithm, "", *cells, command), "missing"))
+    table = Table(
+        "Success on the type left out", columns, "llllllrrrrrrrrc", tuple(lines), source(published, rows, "table1.json")
+    )
+    text = "Minutes are the time of one training. The record of a policy is results/arms/evaluations/POLICY.json."
+    return Item("Sixteen experiments", text, (table,), commands=COMMANDS)
+
+
+def make_controls(published: Published, rows: Sequence[TableRow]) -> Item:
+    """Ours alone: what the end effector's position explains without any hardware."""
+    columns = ("task", "trained on", "tested on", "algorithm", "v_h", "ours [%]", "paper [%]", "difference", "seeds")
+    columns += ("std over seeds", "of reachable goals [%]", "control steps [M]", "minutes", "policies")
+    lines = tuple(
+        Row((row.task, letters(row.train_types), row.test_type, row.algorithm, name_inputs(row), *measurements(row)))
+        for row in rows
+        if row.experiment is None
+    )
+    table = Table("Success on the type left out", columns, "lllllrrrrrrrrc", lines, source(published, rows, "table1.json"))
+    text = (
+        "DDPG+HER that sees the end effector's position, or its offset from the goal, and no v_h: how much of the gain is the "
+        "position rather than the hardware."
+    )
+    commands = ("python -m hcp_jax.sweep experiments/encodings.py --out runs/arms", *COMMANDS[1:])
+    return Item("Controls, which the paper does not have", text, (table,) if lines else (), commands=commands)
+
+
+def measurements(row: TableRow) -> tuple[str, ...]:
+    """Ours, paper's, difference, seeds, deviation over seeds, of reachable goals, steps, minutes, policies."""
+    return (
+        spread(row.success_mean, row.success_std_over_trials),
+        spread(row.paper_mean, row.paper_std),
+        difference(row.success_mean, row.paper_mean),
+        str(len(row.seeds)),
+        decimals(row.success_std_over_seeds),
+        decimals(row.reachable_success_mean),
+        f"{row.control_steps / 1e6:.2f}",
+        f"{row.wall_seconds / 60:.0f}",
+        ", ".join(row.policy),
+    )
+
+
+def make_types(published: Published, rows: Sequence[TableRow], task: str) -> Item:
+    """A column for each type, and per experiment a line of ours, of the paper's and of the difference."""
+    lines: list[Row] = []
+    for setting in SETTINGS:
+        if setting.task == task:
+            for number, (algorithm, file) in enumerate(ALGORITHMS):
+                experiment = setting.experiment + number
+                lines += types_of_experiment(published, rows, setting, experiment, algorithm, setting.experiment_name(file))
+    columns = ("Exp.", "algorithm", "v_h", "", *PAPER_TYPES)
+    table = Table("Success [%] by type", columns, "llll" + "r" * 9, tuple(lines), source(published, rows, "appendix.json"))
+    return Item(task[0].upper() + task[1:], "", (table,), commands=COMMANDS)
+
+
+def types_of_experiment(
+    published: Published, rows: Sequence[TableRow], setting: Setting, experiment: int, algorithm: str, name: str
+) -> list[Row]:
+    """One experiment's lines."""
+    measured = [row for row in rows if row.experiment == experiment and row.test_type in PAPER_TYPES]
+    paper = {letter: paper_by_type(experiment, setting.left_out, letter) for letter in PAPER_TYPES}
+    shown = [spread(*of_type) if of_type else "left out" for of_type in paper.values()]
+    lines = [Row((roman(experiment), algorithm, "", "paper", *shown), "paper")]
+    for inputs in dict.fromkeys(name_inputs(row) for row in measured):
+        ours = {row.test_type: row for row in measured if name_inputs(row) == inputs}
+        first = (roman(experiment), algorithm, inputs)
+        cells, differences = [], []
+        for letter in PAPER_TYPES:
+            row = ours.get(letter)
+            cells.append(spread(row.success_mean, row.success_std_over_trials) if row else "" if not paper[letter] else NOT_RUN)
+            differences.append(difference(row.success_mean, row.paper_mean) if row else "")
+        lines += [Row((*first, "ours", *cells)), Row((*first, "difference", *differences), "difference")]
+    if not measured:
+        state = describe_progress(published, name)
+        lines.append(Row((roman(experiment), algorithm, "", f"ours: {state}", *[""] * len(PAPER_TYPES)), "missing"))
+    return lines
+
+
+def make_other_arms(published: Published, rows: Sequence[TableRow]) -> Item:
+    """Types J and K, which no experiment trains on."""
+    columns = ("Exp.", "algorithm", "v_h", "type", "ours [%]", "paper [%]", "difference", "seeds", "policies")
+    lines = []
+    for letter in OTHER_ARMS:
+        measured = [row for row in rows if row.test_type == letter]
+        for row in measured:
+            ours, paper, points, seeds = measurements(row)[:4]
+            cells = (row.algorithm, name_inputs(row), letter, ours, paper, points, seeds, ", ".join(row.policy))
+            lines.append(Row((roman(row.experiment), *cells)))
+        for (experiment, of_type), paper in PAPER_OTHER_ARMS.items():
+            if of_type == letter and not any(row.experiment == experiment for row in measured):
+                cells = (letter, NOT_RUN, spread(*paper), "", "", "")
+                lines.append(Row((roman(experiment), "HCP-E", "", *cells), "missing"))
+    table = Table(
+        "Success on other arms, peg insertion", columns, "llllrrrrc", tuple(lines), source(published, rows, "appendix.json")
+    )
+    text = "J is a 5-DOF arm without sideways offsets, K is Fetch. The paper tested K ten times."
+    command = EVALUATE_COMMAND.format(name="POLICY") + " --types A B C D E F G H I J K"
+    return Item("Types J and K", text, (table,), commands=(*RESULTS_COMMANDS, command, TABLES_COMMAND))
+
+
+def describe_progress(published: Published, name: str) -> str:
+    """What there is of an experiment without an evaluation: `not run`, or how far its training is."""
+    groups = published.runs_of([name])
+    if not groups:
+        return NOT_RUN
+    run = groups[0][0]
+    curve = read_learning_curve(run.folder, "train_types_success")
+    done = curve[-1, 0] if len(curve) else 0.0
+    return f"not evaluated, {done / 1e6:.1f} of {run.config.total_env_steps / 1e6:.1f} M steps trained"
+
+
+def source(published: Published, rows: Sequence[TableRow], name: str) -> tuple[str, ...]:
+    return (published.show(published.folder / name),) if rows else ()
+
+
+def name_inputs(row: TableRow) -> str:
+    """A policy's v_h, and its network where that is another than usual."""
+    return row.encoding if row.network == "flat" else f"{row.encoding}, network {row.network}"
+
+
+def letters(types) -> str:
+    """`ABCDEFGI` as `A-G, I`."""
+    groups: list[str] = []
+    for letter in types:
+        if groups and ord(letter) == ord(groups[-1][-1]) + 1:
+            groups[-1] += letter
+        else:
+            groups.append(letter)
+    return ", ".join(group if len(group) < 3 else f"{group[0]}\N{EN DASH}{group[-1]}" for group in groups)
+
+
+def decimals(value: float | None) -> str:
+    return "" if value is None else f"{value:.2f}"
+
+
+def spread(mean: float | None, deviation: float | None) -> str:
+    """`92.50 ± 1.96`; the mean alone without a deviation."""
+    return decimals(mean) if mean is None or deviation is None else f"{mean:.2f} \N{PLUS-MINUS SIGN} {deviation:.2f}"
+
+
+def difference(ours: float, paper: float | None) -> str:
+    """In points, with its sign."""
+    return "" if paper is None else f"{ours - paper:+.2f}".replace("-", "\N{MINUS SIGN}")
