@@ -36,17 +36,8 @@ def build_report(results: pathlib.Path) -> tuple[str, list[str]]:
     published = Published(results)
     table1, types = table_sections(published)
     curves, finetuning, *of_type_i = curve_sections(published)
-    sections = (
-        robot_section(),
-        table1,
-        types,
-        curves,
-        distance_section(published),
-        finetuning,
-        *of_type_i,
-        damping_section(published),
-        hopper_section(published),
-    )
+    distances, damping, hopper = distance_section(published), damping_section(published), hopper_section(published)
+    sections = (robot_section(), table1, types, curves, distances, finetuning, *of_type_i, damping, hopper)
     return write_page(TITLE, INTRODUCTION, sections), published.missing
 
 

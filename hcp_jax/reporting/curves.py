@@ -91,8 +91,8 @@ def make_finetuning(published: Published, letter: str, name: str) -> Item:
         curve = average_runs(of_kind, SUCCESS) if of_kind else None
         if curve is not None:
             lines.append(Line(f"{label} ({count_seeds(curve)})", colour, curve))
-            shown += of_kind
-    files = metrics_of(published, shown)
+            shown += metrics_of(published, of_kind)
+    files = tuple(shown)
     figures = (Figure(draw_curves(lines, LABEL, LIMITS), f"New arms of type {letter}.", files),) if lines else ()
     tables = (compare_to_scratch(lines[0].curve, lines[1].curve, files),) if len(lines) == 2 else ()
     train = f"python -m hcp_jax.train --config experiments/{name}.py --out runs/arms"
@@ -126,13 +126,14 @@ def draw_groups(
 ) -> Figure | None:
     """A panel with a line for each experiment that has the column; None if none has."""
     lines, shown = [], []
-    for runs in groups:
+    for runs in sorted(groups, key=lambda runs: runs[0].config.encoding.startswith("none")):  # baselines below
         curve = average_runs(runs, column)
         if curve is not None:
             config = runs[0].config
             lines.append(Line(f"{name_algorithm(config)}: {config.name} ({count_seeds(curve)})", config.encoding, curve))
-            shown += runs
-    return Figure(draw_curves(lines, label, limits), caption, metrics_of(published, shown)) if lines else None
+            shown.append(runs)
+    files = tuple(file for runs in shown for file in metrics_of(published, runs))
+    return Figure(draw_curves(lines, label, limits), caption, files) if lines else None
 
 
 def count_seeds(curve: SeedCurve) -> str:
@@ -140,7 +141,11 @@ def count_seeds(curve: SeedCurve) -> str:
 
 
 def metrics_of(published: Published, runs: Sequence[Run]) -> tuple[str, ...]:
-    return tuple(published.show(run.folder / METRICS_FILE) for run in runs)
+    """The files of one experiment's runs, those of several seeds as one: `results/arms/runs/NAME{_s0,_s1}/metrics.csv`."""
+    names, experiment = [run.folder.name for run in runs], runs[0].config.name
+    if len(names) > 1 and all(name.startswith(experiment) for name in names):
+        names = [f"{experiment}{{{','.join(name.removeprefix(experiment) for name in names)}}}"]
+    return tuple(published.show(runs[0].folder.with_name(name) / METRICS_FILE) for name in names)
 
 
 def train_commands(names: Sequence[str]) -> tuple[str, ...]:

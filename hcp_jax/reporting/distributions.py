@@ -9,7 +9,7 @@ from hcp_jax.evaluation.records import Evaluation, Outcome, read_evaluation
 from hcp_jax.reporting.curves import make_curves
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import Spread, draw_spreads
-from hcp_jax.reporting.published import Published
+from hcp_jax.reporting.published import Published, Run
 from hcp_jax.reporting.settings import EVALUATE_COMMAND, RESULTS_COMMANDS, SETTINGS, TASKS, roman
 from hcp_jax.reporting.tables import NOT_RUN, decimals, difference, spread
 
@@ -40,7 +40,7 @@ def make_distances(published: Published, task: str) -> Item:
     folder = published.folder / "arms" / "evaluations"
     for setting in SETTINGS:
         runs = {run.folder.name: run for run in published.arms if setting.trains(run.config.name)}
-        for name in sorted(runs, key=lambda name: (runs[name].config.encoding == "none", name)):
+        for name in sorted(runs, key=lambda name: (rank(runs[name]), name)):
             if setting.task != task or not (folder / f"{name}.json").exists():
                 continue
             evaluation, config = read_evaluation(folder / f"{name}.json"), runs[name].config
@@ -136,6 +136,12 @@ def draw_damping(
         return None
     mark = SUCCESS_DISTANCE if label == DISTANCE else None
     return Figure(draw_spreads(spreads, label, mark), f"Over damping [N m s/rad]. {describe_kinds(spreads)}", files)
+
+
+def rank(run: Run) -> int:
+    """HCP-E first, then the baseline, then controls."""
+    encoding = run.config.encoding
+    return encoding.startswith("none") + encoding.startswith("none+")
 
 
 def spread_of(label: str, encoding: str, outcome: Outcome, values: np.ndarray | None) -> Spread:

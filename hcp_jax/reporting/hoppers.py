@@ -8,7 +8,6 @@ from hcp_jax.reporting.curves import SPREAD, draw_groups
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import draw_embedding
 from hcp_jax.reporting.published import Published
-from hcp_jax.reporting.tables import spread
 
 LABEL = "return of one episode"
 KINDS = {
@@ -34,7 +33,7 @@ def make_performance(published: Published) -> Item:
     path, rows = published.find("hopper/summary.json"), []
     for row in read_json(path, list) if path else ():
         with naming(path):
-            returns = [spread_or_nothing(row[f"{kind}_mean"], row[f"{kind}_std"]) for kind in RETURNS]
+            returns = [show_return(row[f"{kind}_mean"], row[f"{kind}_std"]) for kind in RETURNS]
             steps, minutes = f"{number(row['env_steps']) / 1e6:.2f}", f"{number(row['wall_seconds']) / 60:.0f}"
             cells = (
                 str(row["algorithm"]),
@@ -116,5 +115,6 @@ def make_embedding(published: Published) -> Item:
     return Item("Embedding", text, (), figures, (train, COLLECT_COMMAND))
 
 
-def spread_or_nothing(mean: object, deviation: object) -> str:
-    return spread(optional_number(mean), optional_number(deviation))
+def show_return(mean: object, deviation: object) -> str:
+    """`5405.8 ± 142.3`, or nothing for what an algorithm does not have."""
+    return "" if mean is None else f"{number(mean):.1f} \N{PLUS-MINUS SIGN} {number(deviation):.1f}"

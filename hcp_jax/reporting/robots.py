@@ -14,8 +14,9 @@ from hcp_jax.hardware.start_poses import start_angles
 from hcp_jax.reporting.plots import render
 
 _START = 37  # of the reacher's start poses: one in the middle of their box
-_AXIS_LENGTH = 0.09  # [m] of the lines that show how joints turn
-_SIZE = (3.0, 3.0)  # [inch]
+_AXIS_LENGTH = 0.1  # [m] of the lines that show how joints turn
+_SIZE = (2.6, 2.6)  # [inch]
+_ROOM = {"x": (0.0, 0.8), "y": (-0.2, 0.4), "z": (0.0, 0.85)}  # [m] that the sketches show
 
 
 def arm_pose(robot_type: str) -> tuple[np.ndarray, np.ndarray]:
@@ -42,11 +43,20 @@ def draw_arm(robot_type: str) -> str:
         for position, axis in zip(positions, axes_of_joints, strict=False):
             ends = np.stack([position - _AXIS_LENGTH * axis, position + _AXIS_LENGTH * axis])
             axes.plot(*ends.T, color="#D55E00", linewidth=1.2)
-        axes.plot(*positions[:-1].T, "o", markersize=7, markerfacecolor="white", markeredgecolor="black")
+        axes.plot(*positions[:-1].T, "o", markersize=6.5, markerfacecolor="white", markeredgecolor="black")
         axes.plot(*positions[-1:].T, "o", markersize=5, color="#0072B2")
-        axes.set(xlim=(-0.2, 0.8), ylim=(-0.5, 0.5), zlim=(0.0, 1.0), xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
-        axes.set(xticks=(0, 0.5), yticks=(-0.5, 0, 0.5), zticks=(0, 0.5, 1))
-        axes.view_init(elev=18, azim=-60)
+        axes.set(
+            **{f"{name}lim": limits for name, limits in _ROOM.items()},
+            xticks=(0, 0.4, 0.8),
+            yticks=(0, 0.4),
+            zticks=(0, 0.4, 0.8),
+        )
+        axes.set_box_aspect([high - low for low, high in _ROOM.values()], zoom=1.0)
+        axes.set_proj_type("ortho")
+        axes.view_init(elev=20, azim=-60)
+        axes.tick_params(pad=-2, labelsize=7)
+        for name in _ROOM:
+            getattr(axes, f"set_{name}label")(f"{name} [m]", labelpad=-6)
 
     return render(draw, _SIZE, "3d")
 
@@ -61,7 +71,7 @@ def describe_arm(robot_type: str) -> str:
 
 
 def draw_hopper() -> str:
-    """The nominal hopper from the side: its links as thick as they are, a ring at each joint; metres."""
+    """The nominal hopper from the side: its links as they are, a ring at each joint; metres."""
     model = mujoco.MjModel.from_xml_path(str(robots_path() / TEMPLATE))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -70,12 +80,18 @@ def draw_hopper() -> str:
         for link in LINKS:
             geom = model.geom(link).id
             radius, half = model.geom_size[geom, :2]
-            along = data.geom_xmat[geom].reshape(3, 3)[:, 2] * half
-            ends = np.stack([data.geom_xpos[geom] - along, data.geom_xpos[geom] + along])
-            # [points]: 72 an inch, and an inch shows half a metre.
-            axes.plot(ends[:, 0], ends[:, 2], color="#999999", linewidth=2 * radius * 72 / 0.5, solid_capstyle="round")
+            along = data.geom_xmat[geom].reshape(3, 3)[[0, 2], 2]
+            axes.fill(*capsule(data.geom_xpos[geom, [0, 2]], along, radius, half).T, color="#999999")
         anchors = data.xanchor[[model.joint(name).id for name in JOINTS]]
         axes.plot(anchors[:, 0], anchors[:, 2], "o", markersize=6, markerfacecolor="white", markeredgecolor="black")
-        axes.set(xlim=(-0.7, 0.7), ylim=(0.0, 1.5), xlabel="x [m]", ylabel="z [m]", aspect="equal")
+        axes.set(xlim=(-0.7, 0.7), ylim=(0.0, 1.6), xlabel="x [m]", ylabel="z [m]", aspect="equal")
 
     return render(draw, _SIZE)
+
+
+def capsule(centre: np.ndarray, along: np.ndarray, radius: float, half: float) -> np.ndarray:
+    """The outline [K, 2] of a capsule of `half` its length in the direction `along` [2]."""
+    across = np.array([-along[1], along[0]])
+    turn = np.linspace(0.0, np.pi, 20)[:, None]
+    cap = radius * (np.cos(turn) * across + np.sin(turn) * along)
+    return np.concatenate([centre + half * along + cap, centre - half * along - cap])

@@ -19,7 +19,7 @@ from hcp_jax.reporting.settings import (
 
 COMMANDS = (*RESULTS_COMMANDS, EVALUATE_COMMAND.format(name="POLICY"), TABLES_COMMAND)
 ALGORITHMS = (("HCP-E", "hcpe"), ("DDPG+HER", "ddpg"))  # of the paper's pairs, with their files' names
-NOT_RUN = "not run"
+NOT_RUN, NOT_EVALUATED = "not run", "not evaluated"
 
 
 def table_sections(published: Published) -> tuple[Section, ...]:
@@ -56,7 +56,7 @@ def make_table1(published: Published, rows: Sequence[TableRow]) -> Item:
             lines += [Row((*first, row.algorithm, name_inputs(row), *measurements(row))) for row in measured]
             if not measured:
                 name = setting.experiment_name(file)
-                cells = (describe_progress(published, name), spread(*paper), *[""] * 6)
+                cells = (NOT_RUN, spread(*paper), *[""] * 4, describe_progress(published, name), "")
                 command = f"python -m hcp_jax.train --config experiments/{name}.py"
                 lines.append(Row((*first, algorithm, "", *cells, command), "missing"))
     table = Table(
@@ -104,17 +104,14 @@ def make_types(published: Published, rows: Sequence[TableRow], task: str) -> Ite
     lines: list[Row] = []
     for setting in SETTINGS:
         if setting.task == task:
-            for number, (algorithm, file) in enumerate(ALGORITHMS):
-                experiment = setting.experiment + number
-                lines += types_of_experiment(published, rows, setting, experiment, algorithm, setting.experiment_name(file))
+            for number, (algorithm, _) in enumerate(ALGORITHMS):
+                lines += types_of_experiment(rows, setting, setting.experiment + number, algorithm)
     columns = ("Exp.", "algorithm", "v_h", "", *PAPER_TYPES)
     table = Table("Success [%] by type", columns, "llll" + "r" * 9, tuple(lines), source(published, rows, "appendix.json"))
     return Item(task[0].upper() + task[1:], "", (table,), commands=COMMANDS)
 
 
-def types_of_experiment(
-    published: Published, rows: Sequence[TableRow], setting: Setting, experiment: int, algorithm: str, name: str
-) -> list[Row]:
+def types_of_experiment(rows: Sequence[TableRow], setting: Setting, experiment: int, algorithm: str) -> list[Row]:
     """One experiment's lines."""
     measured = [row for row in rows if row.experiment == experiment and row.test_type in PAPER_TYPES]
     paper = {letter: paper_by_type(experiment, setting.left_out, letter) for letter in PAPER_TYPES}
@@ -126,12 +123,15 @@ def types_of_experiment(
         cells, differences = [], []
         for letter in PAPER_TYPES:
             row = ours.get(letter)
-            cells.append(spread(row.success_mean, row.success_std_over_trials) if row else "" if not paper[letter] else NOT_RUN)
+            cells.append(
+                spread(row.success_mean, row.success_std_over_trials) if row else NOT_EVALUATED if paper[letter] else ""
+            )
             differences.append(difference(row.success_mean, row.paper_mean) if row else "")
         lines += [Row((*first, "ours", *cells)), Row((*first, "difference", *differences), "difference")]
     if not measured:
-        state = describe_progress(published, name)
-        lines.append(Row((roman(experiment), algorithm, "", f"ours: {state}", *[""] * len(PAPER_TYPES)), "missing"))
+        lines.append(
+            Row((roman(experiment), algorithm, "", "ours", *(NOT_RUN if cell else "" for cell in paper.values())), "missing")
+        )
     return lines
 
 
@@ -158,14 +158,14 @@ def make_other_arms(published: Published, rows: Sequence[TableRow]) -> Item:
 
 
 def describe_progress(published: Published, name: str) -> str:
-    """What there is of an experiment without an evaluation: `not run`, or how far its training is."""
+    """The steps of a training that was not evaluated, of all that it was to have; nothing if there is none."""
     groups = published.runs_of([name])
     if not groups:
-        return NOT_RUN
+        return ""
     run = groups[0][0]
     curve = read_learning_curve(run.folder, "train_types_success")
     done = curve[-1, 0] if len(curve) else 0.0
-    return f"not evaluated, {done / 1e6:.1f} of {run.config.total_env_steps / 1e6:.1f} M steps trained"
+    return f"{done / 1e6:.2f} of {run.config.total_env_steps / 1e6:.2f}, {NOT_EVALUATED}"
 
 
 def source(published: Published, rows: Sequence[TableRow], name: str) -> tuple[str, ...]:
@@ -185,7 +185,7 @@ def letters(types) -> str:
             groups[-1] += letter
         else:
             groups.append(letter)
-    return ", ".join(group if len(group) < 3 else f"{group[0]}\N{EN DASH}{group[-1]}" for group in groups)
+    return ", ".join(group if len(group) < 3 else f"{group[0]}-{group[-1]}" for group in groups)
 
 
 def decimals(value: float | None) -> str:
