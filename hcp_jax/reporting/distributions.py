@@ -11,7 +11,7 @@ from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import Spread, draw_spreads
 from hcp_jax.reporting.published import Published, Run
 from hcp_jax.reporting.settings import EVALUATE_COMMAND, RESULTS_COMMANDS, SETTINGS, TASKS, roman
-from hcp_jax.reporting.tables import NOT_RUN, decimals, difference, spread
+from hcp_jax.reporting.tables import NOT_RUN, capitalise, decimals, difference, spread
 
 QUANTILES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0)  # that every record of arms has
 DISTANCE = "final distance [m]"
@@ -61,7 +61,7 @@ def make_distances(published: Published, task: str) -> Item:
     missing = [name for name in names if f"arms/evaluations/{name}_s" not in " ".join(files)]
     text = f"Not evaluated: {', '.join(missing)}." if missing and figures else ""
     commands = (*RESULTS_COMMANDS, EVALUATE_COMMAND.format(name="POLICY"))
-    return Item(task[0].upper() + task[1:], text, figures=figures, commands=commands)
+    return Item(capitalise(task), text, figures=figures, commands=commands)
 
 
 def damping_section(published: Published) -> Section:

@@ -42,40 +42,44 @@ def table_sections(published: Published) -> tuple[Section, ...]:
     return table1, appendix
 
 
+MEASUREMENTS = ("seeds", "std over seeds", "of reachable goals [%]", "control steps [M]", "minutes")
+
+
 def make_table1(published: Published, rows: Sequence[TableRow]) -> Item:
     """The sixteen experiments in the paper's order; an experiment with several v_h has a row for each."""
-    columns = ("Exp.", "task", "trained on", "tested on", "algorithm", "v_h", "ours [%]", "paper [%]", "difference", "seeds")
-    columns += ("std over seeds", "of reachable goals [%]", "control steps [M]", "minutes", "policies, or the training")
-    lines = []
+    columns = ("Exp.", "tested on", "algorithm", "v_h", "ours [%]", "paper [%]", "difference", "trained on", *MEASUREMENTS)
+    lines: dict[str, list[Row]] = {task: [] for task in TASKS}
     for setting in SETTINGS:
         trained = letters(name for name in PAPER_TYPES if name != setting.left_out)
         for number, (algorithm, file) in enumerate(ALGORITHMS):
-            experiment, paper = setting.experiment + number, setting.paper[number]
-            first = (roman(experiment), setting.task, trained, setting.left_out)
+            experiment = setting.experiment + number
+            first = (roman(experiment), setting.left_out)
             measured = [row for row in rows if row.experiment == experiment]
-            lines += [Row((*first, row.algorithm, name_inputs(row), *measurements(row))) for row in measured]
+            lines[setting.task] += [Row((*first, row.algorithm, name_inputs(row), *measurements(row))) for row in measured]
             if not measured:
                 name = setting.experiment_name(file)
-                cells = (NOT_RUN, spread(*paper), *[""] * 4, describe_progress(published, name), "")
+                cells = (algorithm, "", NOT_RUN, spread(*setting.paper[number]), "", trained, "", "", "")
                 command = f"python -m hcp_jax.train --config experiments/{name}.py"
-                lines.append(Row((*first, algorithm, "", *cells, command), "missing"))
-    table = Table(
-        "Success on the type left out", columns, "llllllrrrrrrrrc", tuple(lines), source(published, rows, "table1.json")
+                lines[setting.task].append(Row((*first, *cells, describe_progress(published, name), "", command), "missing"))
+    files = source(published, rows, "table1.json")
+    tables = tuple(
+        Table(capitalise(task), (*columns, "policies, or the training"), "llllrrrlrrrrrc", tuple(lines[task]), files)
+        for task in TASKS
     )
     text = "Minutes are the time of one training. The record of a policy is results/arms/evaluations/POLICY.json."
-    return Item("Sixteen experiments", text, (table,), commands=COMMANDS)
+    return Item("Sixteen experiments", text, tables, commands=COMMANDS)
 
 
 def make_controls(published: Published, rows: Sequence[TableRow]) -> Item:
     """Ours alone: what the end effector's position explains without any hardware."""
-    columns = ("task", "trained on", "tested on", "algorithm", "v_h", "ours [%]", "paper [%]", "difference", "seeds")
-    columns += ("std over seeds", "of reachable goals [%]", "control steps [M]", "minutes", "policies")
+    columns = ("task", "tested on", "algorithm", "v_h", "ours [%]", "paper [%]", "difference", "trained on", *MEASUREMENTS)
     lines = tuple(
-        Row((row.task, letters(row.train_types), row.test_type, row.algorithm, name_inputs(row), *measurements(row)))
+        Row((row.task, row.test_type, row.algorithm, name_inputs(row), *measurements(row)))
         for row in rows
         if row.experiment is None
     )
-    table = Table("Success on the type left out", columns, "lllllrrrrrrrrc", lines, source(published, rows, "table1.json"))
+    files = source(published, rows, "table1.json")
+    table = Table("Controls", (*columns, "policies"), "llllrrrlrrrrrc", lines, files)
     text = (
         "DDPG+HER that sees the end effector's position, or its offset from the goal, and no v_h: how much of the gain is the "
         "position rather than the hardware."
@@ -85,11 +89,12 @@ def make_controls(published: Published, rows: Sequence[TableRow]) -> Item:
 
 
 def measurements(row: TableRow) -> tuple[str, ...]:
-    """Ours, paper's, difference, seeds, deviation over seeds, of reachable goals, steps, minutes, policies."""
+    """Ours, paper's, difference, types trained on, `MEASUREMENTS`, policies."""
     return (
         spread(row.success_mean, row.success_std_over_trials),
         spread(row.paper_mean, row.paper_std),
         difference(row.success_mean, row.paper_mean),
+        letters(row.train_types),
         str(len(row.seeds)),
         decimals(row.success_std_over_seeds),
         decimals(row.reachable_success_mean),
@@ -108,7 +113,7 @@ def make_types(published: Published, rows: Sequence[TableRow], task: str) -> Ite
                 lines += types_of_experiment(rows, setting, setting.experiment + number, algorithm)
     columns = ("Exp.", "algorithm", "v_h", "", *PAPER_TYPES)
     table = Table("Success [%] by type", columns, "llll" + "r" * 9, tuple(lines), source(published, rows, "appendix.json"))
-    return Item(task[0].upper() + task[1:], "", (table,), commands=COMMANDS)
+    return Item(capitalise(task), "", (table,), commands=COMMANDS)
 
 
 def types_of_experiment(rows: Sequence[TableRow], setting: Setting, experiment: int, algorithm: str) -> list[Row]:
@@ -142,7 +147,7 @@ def make_other_arms(published: Published, rows: Sequence[TableRow]) -> Item:
     for letter in OTHER_ARMS:
         measured = [row for row in rows if row.test_type == letter]
         for row in measured:
-            ours, paper, points, seeds = measurements(row)[:4]
+            ours, paper, points, _, seeds = measurements(row)[:5]
             cells = (row.algorithm, name_inputs(row), letter, ours, paper, points, seeds, ", ".join(row.policy))
             lines.append(Row((roman(row.experiment), *cells)))
         for (experiment, of_type), paper in PAPER_OTHER_ARMS.items():
@@ -200,3 +205,7 @@ def spread(mean: float | None, deviation: float | None) -> str:
 def difference(ours: float, paper: float | None) -> str:
     """In points, with its sign."""
     return "" if paper is None else f"{ours - paper:+.2f}".replace("-", "\N{MINUS SIGN}")
+
+
+def capitalise(text: str) -> str:
+    return text[0].upper() + text[1:]
