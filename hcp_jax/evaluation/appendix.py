@@ -1,8 +1,7 @@
-"""The paper's appendix tables beside ours: success on every type but the one left out, and over ranges of damping."""
+"""The paper's appendix tables, and ours: success on every type but the one left out."""
 
 import pathlib
 
-from hcp_jax.evaluation.records import read_evaluation
 from hcp_jax.evaluation.table1 import find_paper, group_evaluations, left_out_type, make_row, sort_rows
 
 # By experiment: mean and deviation [%] on each type trained on, in the alphabet's order. The paper heads the columns of VII and
@@ -59,39 +58,3 @@ def make_appendix(results: pathlib.Path) -> list[dict]:
             paper = paper_by_type(experiment, left_out, test_type)
             rows.append(make_row(runs, results, test_type, experiment, paper))
     return sort_rows(rows)
-
-
-def make_damping(results: pathlib.Path) -> list[dict]:
-    """One row for each record in `arms/damping`, by damping and policy.
-
-    Args:
-        results: its `arms/damping/*.json` are written by `evaluate POLICY --range damping LOW HIGH --json`.
-
-    Returns:
-        damping_low and damping_high [N m s/rad], test_type, success_mean, success_std_over_trials, episode_length_mean,
-        trials, robots_per_trial, paper_mean (None for other ranges than the paper's), policy, record (path). Success in
-        percent.
-    """
-    rows = []
-    for path in sorted((results / "arms" / "damping").glob("*.json")):
-        evaluation = read_evaluation(path)
-        if "damping" not in evaluation.ranges:
-            continue
-        low, high = evaluation.ranges["damping"]
-        for test_type, outcome in evaluation.types.items():
-            rows.append(
-                {
-                    "damping_low": low,
-                    "damping_high": high,
-                    "test_type": test_type,
-                    "success_mean": outcome.success_mean,
-                    "success_std_over_trials": outcome.success_std,
-                    "episode_length_mean": outcome.episode_length_mean,
-                    "trials": evaluation.trials,
-                    "robots_per_trial": evaluation.robots_per_trial,
-                    "paper_mean": PAPER_DAMPING.get((low, high)),
-                    "policy": evaluation.policy,
-                    "record": path,
-                }
-            )
-    return sorted(rows, key=lambda row: (row["damping_low"], row["damping_high"], row["policy"], row["test_type"]))

@@ -9,6 +9,7 @@ import numpy as np
 from hcp_jax.config import ArmConfig, ArmPoolConfig, ConfigError
 from hcp_jax.envs.goal_episodes import GoalEpisodes
 from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, load_pool
+from hcp_jax.evaluation.records import QUANTILES
 from hcp_jax.experiment.arm import make_arm_experiment, make_evaluator, make_heldout_arms
 from hcp_jax.hardware.arm import OTHER_ARMS, TYPES
 from hcp_jax.hardware.inverse_kinematics import is_reachable
@@ -18,8 +19,6 @@ from hcp_jax.hardware.robot_file import RobotFile
 from hcp_jax.physics.base import default_physics
 from hcp_jax.training import run_folder
 from hcp_jax.training.warm_start import load_policy
-
-QUANTILES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 
 def evaluate_arms(

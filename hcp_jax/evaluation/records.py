@@ -12,6 +12,8 @@ import numpy as np
 from hcp_jax.evaluation.summary import read_curve
 from hcp_jax.training.metrics import METRICS_FILE
 
+QUANTILES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0)  # of the final distance, in records of arms
+
 
 class RecordError(ValueError):
     """A published file is damaged, or was written by another version."""
@@ -105,7 +107,7 @@ class Outcome:
         zero_shot: the type was not trained on.
         success_mean, success_std: [%] over trials.
         episode_length_mean: [control steps].
-        distance_quantiles: [m] of the final distance, by quantile.
+        distance_quantiles: [m] of the final distance, in the order of `QUANTILES`.
         final_distances: [N] m and
         episode_lengths: [N] control steps of each arm; None in records that hold quantiles alone.
     """
@@ -114,7 +116,7 @@ class Outcome:
     success_mean: float
     success_std: float
     episode_length_mean: float
-    distance_quantiles: Mapping[float, float]
+    distance_quantiles: tuple[float, ...]
     final_distances: np.ndarray | None
     episode_lengths: np.ndarray | None
 
@@ -155,7 +157,7 @@ def _outcome(values: dict) -> Outcome:
         success_mean=number(values["success_mean"]),
         success_std=number(values["success_std"]),
         episode_length_mean=number(values["episode_length_mean"]),
-        distance_quantiles={float(q): number(value) for q, value in values["final_distance_quantiles"].items()},
+        distance_quantiles=tuple(number(values["final_distance_quantiles"][f"{q:g}"]) for q in QUANTILES),
         final_distances=_numbers(values.get("final_distances")),
         episode_lengths=_numbers(values.get("episode_lengths")),
     )

@@ -1,11 +1,11 @@
 """Distributions over arms: how near they come to their goals and how long they take, for new types and for other damping."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hcp_jax.evaluation.appendix import PAPER_DAMPING, make_damping
-from hcp_jax.evaluation.records import Evaluation, Outcome, read_evaluation
+from hcp_jax.evaluation.appendix import PAPER_DAMPING
+from hcp_jax.evaluation.records import Evaluation, Outcome, naming, read_evaluation
 from hcp_jax.reporting.curves import make_curves
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import Spread, draw_spreads
@@ -13,7 +13,6 @@ from hcp_jax.reporting.published import Published, Run
 from hcp_jax.reporting.settings import EVALUATE_COMMAND, RESULTS_COMMANDS, SETTINGS, TASKS, roman
 from hcp_jax.reporting.tables import NOT_RUN, capitalise, decimals, difference, spread
 
-QUANTILES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0)  # that every record of arms has
 DISTANCE = "final distance [m]"
 SUCCESS_DISTANCE = (0.02, "success: 0.02 m")
 STRESSED = "peg_low_damping_ddpg"  # trained at damping 0.01 to 2
@@ -36,7 +35,7 @@ def distance_section(published: Published) -> Section:
 
 def make_distances(published: Published, task: str) -> Item:
     """One panel: every evaluated policy of the task's experiments."""
-    spreads, files = [], []
+    spreads, files, shown = [], [], set()
     folder = published.folder / "arms" / "evaluations"
     for setting in SETTINGS:
         runs = {run.folder.name: run for run in published.arms if setting.trains(run.config.name)}
@@ -54,11 +53,12 @@ def make_distances(published: Published, task: str) -> Item:
             label = f"{first}\n{inputs}\nseed {config.seed}"
             spreads.append(spread_of(label, evaluation.encoding, outcome, outcome.final_distances))
             files.append(published.show(evaluation.path))
+            shown.add(config.name)
     figures = ()
     if spreads:
         figures = (Figure(draw_spreads(spreads, DISTANCE, SUCCESS_DISTANCE), describe_kinds(spreads), tuple(files)),)
     names = [s.experiment_name(algorithm) for s in SETTINGS if s.task == task for algorithm in ("hcpe", "ddpg")]
-    missing = [name for name in names if f"arms/evaluations/{name}_s" not in " ".join(files)]
+    missing = [name for name in names if name not in shown]
     text = f"Not evaluated: {', '.join(missing)}." if missing and figures else ""
     commands = (*RESULTS_COMMANDS, EVALUATE_COMMAND.format(name="POLICY"))
     return Item(capitalise(task), text, figures=figures, commands=commands)
@@ -77,35 +77,24 @@ def damping_section(published: Published) -> Section:
 
 def make_damping_item(published: Published) -> Item:
     """The table with the paper's figures, and distance and episode length over ranges."""
-    folder = published.find("arms/damping")
-    rows = make_damping(published.folder) if folder else []
-    evaluations = [read_evaluation(path) for path in dict.fromkeys(row["record"] for row in rows)]
-    files = tuple(published.show(evaluation.path) for evaluation in evaluations)
+    records = read_damping(published)
+    files = tuple(published.show(evaluation.path) for _, evaluation in records)
     lines = []
-    for row in rows:
-        cells = (
-            f"{row['damping_low']:g} to {row['damping_high']:g}",
-            row["test_type"],
-            spread(row["success_mean"], row["success_std_over_trials"] if row["trials"] > 1 else None),
-            decimals(row["paper_mean"]),
-            difference(row["success_mean"], row["paper_mean"]),
-            f"{row['episode_length_mean']:.1f}",
-            str(row["trials"] * row["robots_per_trial"]),
-            row["policy"],
-        )
-        lines.append(Row(cells))
-    for (low, high), success in PAPER_DAMPING.items():
-        if rows and not any((row["damping_low"], row["damping_high"]) == (low, high) for row in rows):
-            lines.append(Row((f"{low:g} to {high:g}", "", NOT_RUN, decimals(success), "", "", "", ""), "missing"))
+    for damping in sorted({*PAPER_DAMPING, *(damping for damping, _ in records)}):
+        evaluations = [evaluation for of_record, evaluation in records if of_record == damping]
+        lines += [line for evaluation in evaluations for line in damping_lines(damping, evaluation)]
+        if not evaluations:
+            cells = (name_range(damping), "", NOT_RUN, decimals(PAPER_DAMPING[damping]), "", "", "", "")
+            lines.append(Row(cells, "missing"))
     columns = ("damping [N m s/rad]", "type", "ours [%]", "paper [%]", "difference", "mean episode length [steps]", "arms")
-    tables = (Table("Success by range of damping", (*columns, "policy"), "llrrrrrc", tuple(lines), files),) if rows else ()
+    tables = (Table("Success by range of damping", (*columns, "policy"), "llrrrrrc", tuple(lines), files),)
     figures = tuple(
         figure
         for label, take in (
             (DISTANCE, lambda outcome: outcome.final_distances),
             ("episode length [control steps]", lambda outcome: outcome.episode_lengths),
         )
-        if (figure := draw_damping(evaluations, label, take, files)) is not None
+        if (figure := draw_damping(records, label, take, files)) is not None
     )
     commands = [
         f"python -m hcp_jax.train --config experiments/{STRESSED}.py --out runs/arms/{STRESSED}_s0",
@@ -119,16 +108,51 @@ def make_damping_item(published: Published) -> Item:
     return Item("Success, distance and episode length", "", tables, figures, tuple(commands))
 
 
+def read_damping(published: Published) -> list[tuple[tuple[float, float], Evaluation]]:
+    """The records in `arms/damping`, with their range, by range. Raises RecordError if one has no range of damping."""
+    folder = published.find("arms/damping")
+    records = []
+    for path in sorted(folder.glob("*.json")) if folder else ():
+        evaluation = read_evaluation(path)
+        with naming(path):
+            records.append((evaluation.ranges["damping"], evaluation))
+    return sorted(records, key=lambda record: record[0])
+
+
+def name_range(damping: tuple[float, float]) -> str:
+    return f"{damping[0]:g} to {damping[1]:g}"
+
+
+def damping_lines(damping: tuple[float, float], evaluation: Evaluation) -> list[Row]:
+    """A row for each type of a record."""
+    lines, paper = [], PAPER_DAMPING.get(damping)
+    for robot_type, outcome in evaluation.types.items():
+        cells = (
+            name_range(damping),
+            robot_type,
+            spread(outcome.success_mean, outcome.success_std if evaluation.trials > 1 else None),
+            decimals(paper),
+            difference(outcome.success_mean, paper),
+            f"{outcome.episode_length_mean:.1f}",
+            str(evaluation.trials * evaluation.robots_per_trial),
+            evaluation.policy,
+        )
+        lines.append(Row(cells))
+    return lines
+
+
 def draw_damping(
-    evaluations: list[Evaluation], label: str, take: Callable[[Outcome], np.ndarray | None], files: tuple[str, ...]
+    records: Sequence[tuple[tuple[float, float], Evaluation]],
+    label: str,
+    take: Callable[[Outcome], np.ndarray | None],
+    files: tuple[str, ...],
 ) -> Figure | None:
     """A distribution for each record and type; None where no record holds any."""
-    several = len({evaluation.policy for evaluation in evaluations}) > 1
+    several = len({evaluation.policy for _, evaluation in records}) > 1
     spreads = []
-    for evaluation in evaluations:
-        low, high = evaluation.ranges["damping"]
+    for damping, evaluation in records:
         for outcome in evaluation.types.values():
-            place = f"{low:g} to {high:g}" + f"\n{evaluation.policy.rpartition('_')[2]}" * several
+            place = name_range(damping) + f"\n{evaluation.policy.rpartition('_')[2]}" * several
             spreads.append(spread_of(place, evaluation.encoding, outcome, take(outcome)))
     if label != DISTANCE:  # records without single episodes have quantiles of the distance alone
         spreads = [spread for spread in spreads if spread.values is not None]
@@ -145,7 +169,7 @@ def rank(run: Run) -> int:
 
 
 def spread_of(label: str, encoding: str, outcome: Outcome, values: np.ndarray | None) -> Spread:
-    return Spread(label, encoding, values, tuple(outcome.distance_quantiles[q] for q in QUANTILES))
+    return Spread(label, encoding, values, outcome.distance_quantiles)
 
 
 def describe_kinds(spreads: list[Spread]) -> str:

@@ -1,6 +1,6 @@
 """The paper's tables beside ours."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from hcp_jax.evaluation.appendix import PAPER_OTHER_ARMS, PAPER_TYPES, paper_by_type
 from hcp_jax.evaluation.records import TableRow, read_learning_curve
@@ -19,6 +19,7 @@ from hcp_jax.reporting.settings import (
 
 COMMANDS = (*RESULTS_COMMANDS, EVALUATE_COMMAND.format(name="POLICY"), TABLES_COMMAND)
 ALGORITHMS = (("HCP-E", "hcpe"), ("DDPG+HER", "ddpg"))  # of the paper's pairs, with their files' names
+MEASUREMENTS = ("seeds", "std over seeds", "of reachable goals [%]", "control steps [M]", "minutes")
 NOT_RUN, NOT_EVALUATED = "not run", "not evaluated"
 
 
@@ -40,9 +41,6 @@ def table_sections(published: Published) -> tuple[Section, ...]:
         "to G and I, though these left E out; here they are read in order, as A to D and F to I.",
     )
     return table1, appendix
-
-
-MEASUREMENTS = ("seeds", "std over seeds", "of reachable goals [%]", "control steps [M]", "minutes")
 
 
 def make_table1(published: Published, rows: Sequence[TableRow]) -> Item:
@@ -74,7 +72,7 @@ def make_controls(published: Published, rows: Sequence[TableRow]) -> Item:
     """Ours alone: what the end effector's position explains without any hardware."""
     columns = ("task", "tested on", "algorithm", "v_h", "ours [%]", "paper [%]", "difference", "trained on", *MEASUREMENTS)
     lines = tuple(
-        Row((row.task, row.test_type, row.algorithm, name_inputs(row), *measurements(row)))
+        Row((row.task.replace("_", " "), row.test_type, row.algorithm, name_inputs(row), *measurements(row)))
         for row in rows
         if row.experiment is None
     )
@@ -134,9 +132,8 @@ def types_of_experiment(rows: Sequence[TableRow], setting: Setting, experiment: 
             differences.append(difference(row.success_mean, row.paper_mean) if row else "")
         lines += [Row((*first, "ours", *cells)), Row((*first, "difference", *differences), "difference")]
     if not measured:
-        lines.append(
-            Row((roman(experiment), algorithm, "", "ours", *(NOT_RUN if cell else "" for cell in paper.values())), "missing")
-        )
+        cells = [NOT_RUN if of_type else "" for of_type in paper.values()]
+        lines.append(Row((roman(experiment), algorithm, "", "ours", *cells), "missing"))
     return lines
 
 
@@ -182,7 +179,7 @@ def name_inputs(row: TableRow) -> str:
     return row.encoding if row.network == "flat" else f"{row.encoding}, network {row.network}"
 
 
-def letters(types) -> str:
+def letters(types: Iterable[str]) -> str:
     """`ABCDEFGI` as `A-G, I`."""
     groups: list[str] = []
     for letter in types:

@@ -277,7 +277,13 @@ DAMAGED = {
         "'high' is no finite",
     ),
     "infinite": ("arms/damping/low_s0_0.01_2.json", json.dumps(evaluation("a", {"I": outcome(np.inf)})), "inf is no finite"),
+    "no range": ("arms/damping/low_s0_0.01_2.json", json.dumps(evaluation("a", {"I": outcome(1.0)})), "no field 'damping'"),
     "an evaluation cut off": ("arms/evaluations/reacher_ddpg_leave_h_s0.json", '{"run": "a"', "damaged"),
+    "other quantiles": (
+        "arms/evaluations/reacher_ddpg_leave_h_s0.json",
+        json.dumps(evaluation("a", {"H": outcome(0.0, final_distance_quantiles={"0.5": 0.1})})),
+        "no field '0'",
+    ),
     "bytes": ("arms/evaluations/reacher_hcpe_leave_h_s0.json", b"\xff\xfe\x00", "damaged"),
     "a config cut off": ("arms/runs/reacher_hcpe_leave_h_s0/config.json", "{", "damaged"),
     "metrics with a word": (
