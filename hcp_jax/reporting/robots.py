@@ -55,8 +55,9 @@ def draw_arm(robot_type: str) -> str:
         axes.set_proj_type("ortho")
         axes.view_init(elev=20, azim=-60)
         axes.tick_params(pad=-2, labelsize=7)
-        for name in _ROOM:
-            getattr(axes, f"set_{name}label")(f"{name} [m]", labelpad=-6)
+        axes.set_xlabel("x [m]", labelpad=-6)
+        axes.set_ylabel("y [m]", labelpad=-6)
+        axes.text2D(0.8, 0.97, "z [m]", transform=axes.transAxes)  # a label at its side would be cut off
 
     return render(draw, _SIZE, "3d")
 

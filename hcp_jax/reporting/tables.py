@@ -56,12 +56,14 @@ def make_table1(published: Published, rows: Sequence[TableRow]) -> Item:
             lines[setting.task] += [Row((*first, row.algorithm, name_inputs(row), *measurements(row))) for row in measured]
             if not measured:
                 name = setting.experiment_name(file)
-                cells = (algorithm, "", NOT_RUN, spread(*setting.paper[number]), "", trained, "", "", "")
+                steps = describe_progress(published, name)
+                state = NOT_EVALUATED if steps else NOT_RUN
+                cells = (algorithm, "", state, spread(*setting.paper[number]), "", trained, "", "", "", steps, "")
                 command = f"python -m hcp_jax.train --config experiments/{name}.py"
-                lines[setting.task].append(Row((*first, *cells, describe_progress(published, name), "", command), "missing"))
+                lines[setting.task].append(Row((*first, *cells, command), "missing"))
     files = source(published, rows, "table1.json")
     tables = tuple(
-        Table(capitalise(task), (*columns, "policies, or the training"), "llllrrrlrrrrrc", tuple(lines[task]), files)
+        Table(capitalise(task), (*columns, "policies, or training"), "llllrrrlrrrrrc", tuple(lines[task]), files)
         for task in TASKS
     )
     text = "Minutes are the time of one training. The record of a policy is results/arms/evaluations/POLICY.json."
@@ -167,7 +169,7 @@ def describe_progress(published: Published, name: str) -> str:
     run = groups[0][0]
     curve = read_learning_curve(run.folder, "train_types_success")
     done = curve[-1, 0] if len(curve) else 0.0
-    return f"{done / 1e6:.2f} of {run.config.total_env_steps / 1e6:.2f}, {NOT_EVALUATED}"
+    return f"{done / 1e6:.2f} of {run.config.total_env_steps / 1e6:.2f}"
 
 
 def source(published: Published, rows: Sequence[TableRow], name: str) -> tuple[str, ...]:
