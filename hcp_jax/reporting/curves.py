@@ -1,9 +1,10 @@
 """Learning curves of the arms, and what fine-tuning saves."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from hcp_jax.config import Config
 from hcp_jax.evaluation.summary import SeedCurve, name_algorithm
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import Line, draw_curves
@@ -84,17 +85,17 @@ def make_curves(published: Published, title: str, names: Sequence[str]) -> Item:
 def make_finetuning(published: Published, letter: str, name: str) -> Item:
     """Runs that start from another one beside those from scratch, and the steps at which they reach what these end with."""
     scratch_name, lines, shown = f"{name}_scratch", [], []
-    runs = [run for group in published.runs_of([name, scratch_name]) for run in group]
-    kinds = (("from scratch", "none", False), ("from the policy that never saw the type", "chain_fk", True))
-    for label, colour, is_pretrained in kinds:
-        of_kind = [run for run in runs if bool(run.config.init) == is_pretrained]
-        curve = average_runs(of_kind, SUCCESS) if of_kind else None
+    groups = published.runs_of([name, scratch_name])
+    for runs in sorted(groups, key=lambda runs: bool(runs[0].config.init)):
+        curve, is_pretrained = average_runs(runs, SUCCESS), bool(runs[0].config.init)
         if curve is not None:
-            lines.append(Line(f"{label} ({count_seeds(curve)})", colour, curve))
-            shown += metrics_of(published, of_kind)
+            label = "from the policy that never saw the type" if is_pretrained else "from scratch"
+            lines.append(Line(f"{label} ({count_seeds(curve)})", "chain_fk" if is_pretrained else "none", curve))
+            shown += metrics_of(published, runs)
     files = tuple(shown)
     figures = (Figure(draw_curves(lines, LABEL, LIMITS), f"New arms of type {letter}.", files),) if lines else ()
-    tables = (compare_to_scratch(lines[0].curve, lines[1].curve, files),) if len(lines) == 2 else ()
+    is_pair = [line.encoding for line in lines] == ["none", "chain_fk"]
+    tables = (compare_to_scratch(lines[0].curve, lines[1].curve, files),) if is_pair else ()
     train = f"python -m hcp_jax.train --config experiments/{name}.py --out runs/arms"
     commands = (
         f"{train}/{name}_s0 --config.init=results/policies/random_peg_hcpe_leave_{letter.lower()}_s0",
@@ -122,18 +123,23 @@ def compare_to_scratch(scratch: SeedCurve, pretrained: SeedCurve, sources: tuple
 
 
 def draw_groups(
-    published: Published, groups: Sequence[Sequence[Run]], column: str, caption: str, label: str = LABEL, limits=LIMITS
+    published: Published,
+    groups: Sequence[Sequence[Run]],
+    column: str,
+    caption: str,
+    label: str = LABEL,
+    limits: tuple[float, float] | None = LIMITS,
+    name: Callable[[Config], str] = lambda config: f"{name_algorithm(config)}: {config.name}",
 ) -> Figure | None:
-    """A panel with a line for each experiment that has the column; None if none has."""
-    lines, shown = [], []
+    """A panel with a line for each group of seeds that has the column; None if none has."""
+    lines, files = [], []
     for runs in sorted(groups, key=lambda runs: runs[0].config.encoding.startswith("none")):  # baselines below
         curve = average_runs(runs, column)
         if curve is not None:
             config = runs[0].config
-            lines.append(Line(f"{name_algorithm(config)}: {config.name} ({count_seeds(curve)})", config.encoding, curve))
-            shown.append(runs)
-    files = tuple(file for runs in shown for file in metrics_of(published, runs))
-    return Figure(draw_curves(lines, label, limits), caption, files) if lines else None
+            lines.append(Line(f"{name(config)} ({count_seeds(curve)})", config.encoding, curve))
+            files += metrics_of(published, runs)
+    return Figure(draw_curves(lines, label, limits), caption, tuple(files)) if lines else None
 
 
 def count_seeds(curve: SeedCurve) -> str:

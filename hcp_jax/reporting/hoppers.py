@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from hcp_jax.config import Config
 from hcp_jax.evaluation.records import naming, number, optional_number, read_json
 from hcp_jax.evaluation.summary import RETURNS
 from hcp_jax.reporting.curves import SPREAD, draw_groups
@@ -84,7 +85,8 @@ def make_new_hoppers(published: Published) -> Item:
             Table("Steps to the return of a training from scratch", columns, "clrrrrr", tuple(rows), (published.show(path),)),
         )
     names = dict.fromkeys(run.config.name for run in published.hoppers if run.config.pool.split == "new")
-    figure = draw_groups(published, published.runs_of(list(names)), "train_return_mean", "The 100 new hoppers.", LABEL, None)
+    groups, caption = published.runs_of(list(names)), "The 100 new hoppers."
+    figure = draw_groups(published, groups, "train_return_mean", caption, LABEL, None, name_start)
     train, init = "python -m hcp_jax.train --config experiments", "--config.init=results/policies/hopper_hcpi_s0"
     commands = (
         f"{train}/hopper_finetune_scratch.py --out runs/hopper/hopper_finetune_scratch_s0",
@@ -93,6 +95,10 @@ def make_new_hoppers(published: Published) -> Item:
         COLLECT_COMMAND,
     )
     return Item("Transfer to 100 new hoppers", "", tables, (figure,) if figure else (), commands)
+
+
+def name_start(config: Config) -> str:
+    return f"pretrained, {config.init_layers} layers" if config.init else "from scratch"
 
 
 def make_embedding(published: Published) -> Item:

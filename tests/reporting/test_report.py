@@ -20,6 +20,7 @@ from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.table1 import PAPER
 from hcp_jax.hardware.arm import arm_spec
 from hcp_jax.hardware.start_poses import start_angles
+from hcp_jax.reporting.published import Published
 from hcp_jax.reporting.robots import arm_pose
 from hcp_jax.reporting.settings import SETTINGS, roman
 from hcp_jax.reporting.tables import letters
@@ -333,6 +334,21 @@ def test_fine_tuning_is_compared_by_steps(tiny):
     (row,) = tiny.tables["finetuning", "Steps to what a training from scratch ends with"][1:]
     assert row == ["60.0", "3.00", "2.00", "67", "90.0"]
     assert len(tiny.pictures["finetuning"]) == 1
+
+
+def test_only_seeds_of_one_config_are_averaged(tiny_config, tmp_path):
+    changes = (
+        {"seed": 0},
+        {"seed": 1},
+        {"init": "runs/a"},
+        {"init": "runs/b", "seed": 1},
+        {"init": "runs/a", "init_layers": "all"},
+    )
+    for number, change in enumerate(changes):
+        config = dataclasses.replace(tiny_config, name="same", **change)
+        write_run(tmp_path / "hopper" / "runs" / f"run{number}", config, [{"env_steps": 64, "train_return_mean": 1.0}])
+    groups = Published(tmp_path).runs_of(["same"])
+    assert [[run.folder.name for run in group] for group in groups] == [["run0", "run1"], ["run2", "run3"], ["run4"]]
 
 
 def test_letters_are_shown_as_ranges():
