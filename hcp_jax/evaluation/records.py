@@ -1,6 +1,7 @@
 """Reading published records back. What is damaged is an error that names its file."""
 
 import contextlib
+import csv
 import dataclasses
 import json
 import math
@@ -11,6 +12,7 @@ import numpy as np
 
 from hcp_jax.evaluation.summary import read_curve
 from hcp_jax.training.metrics import METRICS_FILE
+from hcp_jax.training.run_folder import RunFolderError
 
 QUANTILES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0)  # of the final distance, in records of arms
 
@@ -24,11 +26,11 @@ def naming(path: pathlib.Path) -> Iterator[None]:
     """Whatever is wrong with a file's content becomes a RecordError that names it."""
     try:
         yield
-    except RecordError:
+    except (RecordError, RunFolderError):  # name it already
         raise
     except KeyError as error:
         raise RecordError(f"{path}: damaged or of another version (no field {error})") from error
-    except (ValueError, TypeError, AttributeError, IndexError) as error:
+    except (ValueError, TypeError, AttributeError, IndexError, ArithmeticError, csv.Error) as error:
         raise RecordError(f"{path}: damaged or of another version ({error})") from error
 
 

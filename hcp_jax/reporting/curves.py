@@ -29,7 +29,7 @@ def curve_sections(published: Published) -> tuple[Section, ...]:
             "curves",
             "Learning curves: one type left out",
             tuple(make_leave_one_out(published, setting) for setting in SETTINGS),
-            f"{SPREAD} Each point is one episode of each of 25 new arms of a type.",
+            f"{SPREAD} Each point is one episode of each held-out arm.",
         ),
         Section(
             "finetuning",

@@ -104,7 +104,7 @@ def name_start(config: Config) -> str:
 def make_embedding(published: Published) -> Item:
     """The learned v_h of hoppers that differ in torso mass alone."""
     path = published.find("hopper/embedding.json")
-    figures, text = (), "1000 hoppers that differ in torso mass alone, each with two learned numbers."
+    figures, text = (), "Hoppers that differ in torso mass alone, each with two learned numbers."
     if path:
         record = read_json(path, dict)
         with naming(path):
@@ -112,11 +112,9 @@ def make_embedding(published: Published) -> Item:
             mass = np.asarray([number(value) for value in record["torso_mass"]])
             if len(points) != len(mass):
                 raise ValueError(f"{len(points)} rows of embedding, {len(mass)} of torso_mass")
-            text += (
-                f" The mean mass of the {int(record['neighbours'])} nearest others predicts the mass with R\N{SUPERSCRIPT TWO} "
-            )
-            text += f"{number(record['r2']):.4f}, cross-validated."
-        figures = (Figure(draw_embedding(points, mass), "Each dot is a hopper.", (published.show(path),)),)
+            r2 = f"R\N{SUPERSCRIPT TWO} {number(record['r2']):.4f}, cross-validated"
+            text += f" The mean mass of the {int(record['neighbours'])} nearest others predicts the mass with {r2}."
+        figures = (Figure(draw_embedding(points, mass), f"Each of {len(points)} dots is a hopper.", (published.show(path),)),)
     train = "python -m hcp_jax.train --config experiments/hopper_embedding.py --out runs/hopper/hopper_embedding_s0"
     return Item("Embedding", text, (), figures, (train, COLLECT_COMMAND))
 

@@ -6,10 +6,10 @@ import pathlib
 from collections.abc import Sequence
 
 from hcp_jax.config import Config, ConfigError, to_dict
-from hcp_jax.evaluation.records import TableRow, read_learning_curve, read_table
+from hcp_jax.evaluation.records import TableRow, naming, read_learning_curve, read_table
 from hcp_jax.evaluation.summary import SeedCurve, average_curves
 from hcp_jax.training.metrics import METRICS_FILE
-from hcp_jax.training.run_folder import read_config
+from hcp_jax.training.run_folder import CONFIG_FILE, read_config
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Published:
     """
 
     def __init__(self, folder: pathlib.Path):
-        """Raises ConfigError if there is nothing of results in `folder`, RunFolderError if a run's config is damaged."""
+        """Raises ConfigError if `folder` holds nothing of results, RunFolderError or RecordError if a config is damaged."""
         self.folder = folder
         self.missing: list[str] = []
         if not any((folder / name).exists() for name in ("table1.json", "arms", "hopper")):
@@ -70,7 +70,8 @@ class Published:
         runs = []
         for path in sorted(folder.iterdir()) if folder else ():
             if path.is_dir() and self.find(f"{task}/runs/{path.name}/{METRICS_FILE}"):
-                runs.append(Run(path, read_config(path)))
+                with naming(path / CONFIG_FILE):
+                    runs.append(Run(path, read_config(path)))
         return runs
 
 

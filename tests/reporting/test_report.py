@@ -268,6 +268,7 @@ def fails(capsys, results: pathlib.Path, out: pathlib.Path) -> str:
 
 
 ROW = {"experiment": 1, "task": "reacher", "success_mean": 90.0}
+FULL_ROW = json.loads((ROOT / "results" / "table1.json").read_text())[0]
 DAMAGED = {
     "cut off": ("table1.json", '[\n {"experiment": 1,', "damaged"),
     "no list": ("table1.json", "{}", "holds a dict, expected a list"),
@@ -287,6 +288,9 @@ DAMAGED = {
     ),
     "bytes": ("arms/evaluations/reacher_hcpe_leave_h_s0.json", b"\xff\xfe\x00", "damaged"),
     "a config cut off": ("arms/runs/reacher_hcpe_leave_h_s0/config.json", "{", "damaged"),
+    "a config of bytes": ("hopper/runs/hopper_none_s0/config.json", b"\xff\xfe\x00", "damaged"),
+    "a config that is a list": ("hopper/runs/hopper_none_s0/config.json", "[]", "damaged"),
+    "infinite steps": ("appendix.json", json.dumps([FULL_ROW | {"control_steps": np.inf}]), "infinity"),
     "metrics with a word": (
         "arms/runs/reacher_hcpe_leave_h_s1/metrics.csv",
         "env_steps,train_types_success\n80,high\n",
