@@ -14,6 +14,7 @@ from absl import flags
 from ml_collections import ConfigDict, config_flags
 
 from hcp_jax.config import Config, ConfigError, field_names, from_dict, to_dict, unknown_field
+from hcp_jax.evaluation.records import RecordError
 from hcp_jax.hardware.pool import PoolError
 from hcp_jax.hardware.ranges import RangeError
 from hcp_jax.hardware.robot_file import RobotFileError
@@ -23,7 +24,7 @@ from hcp_jax.training.loop import NonFiniteError
 from hcp_jax.training.run_folder import RunFolderError
 
 BAD_INPUT, BROKEN = 2, 1
-_USER_ERRORS = (ConfigError, RangeError, RunFolderError, CheckpointError, PoolError, RobotFileError)
+_USER_ERRORS = (ConfigError, RangeError, RunFolderError, CheckpointError, PoolError, RobotFileError, RecordError)
 _OVERRIDE = re.compile(r"--config\.([^=\s]+)(=.*)?$", re.DOTALL)
 
 

@@ -3,6 +3,7 @@
 import pathlib
 from collections.abc import Sequence
 
+from hcp_jax.evaluation.appendix import make_appendix
 from hcp_jax.evaluation.publishing import group_by_name, plot_groups, publish_runs
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.summary import SUCCESSES, summarise_runs
@@ -14,8 +15,8 @@ def collect_arms(folders: Sequence[pathlib.Path], results: pathlib.Path) -> list
     """Adds the arms' run folders to `results`; returns a line for each thing written.
 
     Each run's metrics under `arms/runs/` and its policy under `policies/`; from all runs there, `arms/summary.json` (a row per
-    experiment) and `arms/TASK.png` (curves of each task's experiments); and `table1.json`, of the policies whose evaluations
-    are there.
+    experiment) and `arms/TASK.png` (curves of each task's experiments); and `table1.json` and `appendix.json`, of the policies
+    whose evaluations are there.
     """
     out = results / "arms"
     published = publish_runs(folders, out, results / "policies")
@@ -23,10 +24,10 @@ def collect_arms(folders: Sequence[pathlib.Path], results: pathlib.Path) -> list
     for task in dict.fromkeys(read_config(folder).task for folder in published):
         groups = group_by_name([folder for folder in published if read_config(folder).task == task])
         plot_groups(groups, out / f"{task}.png", SUCCESSES, "success [%] on held-out robots")
-    rows = make_table1(results)
-    write_json(results / "table1.json", rows)
-    return [
-        f"{out}/runs, {results}/policies: {', '.join(folder.name for folder in folders)}",
-        f"{results}/table1.json: {len(rows)} rows",
-        f"{out}/summary.json: {', '.join(group_by_name(published))}",
-    ]
+    written = [f"{out}/runs, {results}/policies: {', '.join(folder.name for folder in folders)}"]
+    for name, make_rows in (("table1", make_table1), ("appendix", make_appendix)):
+        rows = make_rows(results)
+        write_json(results / f"{name}.json", rows)
+        written.append(f"{results}/{name}.json: {len(rows)} rows")
+    written.append(f"{out}/summary.json: {', '.join(group_by_name(published))}")
+    return written

@@ -9,6 +9,7 @@ import numpy as np
 from hcp_jax.config import ArmConfig, ArmPoolConfig, ConfigError
 from hcp_jax.envs.goal_episodes import GoalEpisodes
 from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, load_pool
+from hcp_jax.evaluation.records import QUANTILES
 from hcp_jax.experiment.arm import make_arm_experiment, make_evaluator, make_heldout_arms
 from hcp_jax.hardware.arm import OTHER_ARMS, TYPES
 from hcp_jax.hardware.inverse_kinematics import is_reachable
@@ -18,8 +19,6 @@ from hcp_jax.hardware.robot_file import RobotFile
 from hcp_jax.physics.base import default_physics
 from hcp_jax.training import run_folder
 from hcp_jax.training.warm_start import load_policy
-
-QUANTILES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 
 def evaluate_arms(
@@ -114,7 +113,8 @@ def split_types(pool: RobotPool, types: Sequence[str]) -> dict[str, RobotPool]:
 
 
 def summarise_type(episodes: GoalEpisodes, reachable: np.ndarray, stuck: np.ndarray, trials: int) -> dict:
-    """Success over trials, over the goals that the arm can reach at all, and over the arms that can move all their joints."""
+    """Success over trials, over the goals that the arm can reach at all, and over the arms that can move all their joints;
+    final distance [m] and length of each episode, for distributions."""
 
     def percent(chosen: np.ndarray) -> float | None:
         return 100.0 * float(episodes.success[chosen].mean()) if chosen.any() else None
@@ -129,6 +129,8 @@ def summarise_type(episodes: GoalEpisodes, reachable: np.ndarray, stuck: np.ndar
         "immovable_share": 100.0 * float(stuck.mean()),
         "final_distance_quantiles": {f"{q:g}": float(np.quantile(episodes.final_distance, q)) for q in QUANTILES},
         "episode_length_mean": float(episodes.episode_length.mean()),
+        "final_distances": np.round(np.asarray(episodes.final_distance, np.float64), 4).tolist(),
+        "episode_lengths": np.asarray(episodes.episode_length).tolist(),
     }
 
 

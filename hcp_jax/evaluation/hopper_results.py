@@ -72,7 +72,7 @@ def write_finetune(folders: Sequence[pathlib.Path], out: pathlib.Path) -> str:
 
 
 def write_embedding(folder: pathlib.Path, out: pathlib.Path) -> str:
-    """R^2 of the torso mass from the 2-D embedding, and its scatter plot."""
+    """R^2 of the torso mass [kg] from the 2-D embedding, both for each hopper, and their scatter plot."""
     run = make_experiment(read_config(folder))
     iteration, state = load_policy(folder, run)
     embedding, mass = np.asarray(state.params["embedding"]), run.train_pool.hardware["body_mass"][:, 0]
@@ -82,6 +82,8 @@ def write_embedding(folder: pathlib.Path, out: pathlib.Path) -> str:
         "neighbours": 5,
         "folds": 5,
         "r2": round(knn_r2(embedding, mass), 4),
+        "embedding": np.round(embedding.astype(np.float64), 4).tolist(),
+        "torso_mass": np.round(mass, 4).tolist(),
         "commit": read_run_commit(folder),
     }
     write_json(out / "embedding.json", record)
