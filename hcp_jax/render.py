@@ -38,13 +38,13 @@ def main(arguments: list[str] | None = None) -> None:
         if options.robot and read_config(options.run).task == "hopper":
             raise ConfigError("--robot: goes with a policy of arms")
         check_output(options.out)
-        choose_backend()
+        backend = choose_backend()
         own = (options.robot.stem, read_robot(options.robot, options.base, options.tip)) if options.robot else None
         command_line.enable_compilation_cache()
         recording = record_episodes(options.run, chosen, own, options.physics, options.seed, options.best)
         for name, outcome in zip(recording.names, recording.outcomes, strict=True):
             print(f"{name}: {outcome}", flush=True)
-        write_film(recording, options.out, options.pictures)
+        write_film(recording, options.out, backend, options.pictures)
         print(f"wrote {options.out}")
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from flax import struct
 
 from hcp_jax.envs.episodes import stack_states, without_overflow
-from hcp_jax.envs.goal import GoalEnv
+from hcp_jax.envs.goal import GoalEnv, GoalState, GoalTransition
 from hcp_jax.physics.base import PhysicsState
 
 # (params, index [B], obs [B, O], goal [B, G]) -> action [B, A]
@@ -58,6 +58,10 @@ class GoalEvaluator:
             states.append(carry[0].physics)
         return without_overflow(carry[1]), stack_states(states)
 
+    def step(self, params, state: GoalState) -> tuple[GoalState, GoalTransition]:
+        """One control step of every world under the policy."""
+        return self.env.step(state, self._policy(params, state.index, state.obs, state.desired_goal))
+
     def _play_episodes(self, params, index, key) -> GoalEpisodes:
         carry = self._start_episodes(index, key)
         return jax.lax.while_loop(self._is_going_on, lambda carry: self._play_step(params, carry), carry)[1]
@@ -83,8 +87,7 @@ class GoalEvaluator:
     def _play_step(self, params, carry):
         state, episodes, step = carry
         alive = ~(episodes.success | episodes.diverged)
-        action = self._policy(params, episodes.index, state.obs, state.desired_goal)
-        state, transition = self.env.step(state, action)
+        state, transition = self.step(params, state)
         episodes = episodes.replace(
             success=episodes.success | (alive & transition.success & ~transition.diverged),
             final_distance=jnp.where(alive, transition.distance, episodes.final_distance),

@@ -17,7 +17,7 @@ GOAL_BODY, GOAL_GEOMS = "goal", ("goal", "goal_halo")
 OPEN_GOAL, REACHED_GOAL = (0.95, 0.5, 0.1), (0.15, 0.7, 0.2)
 _LINK_COLOUR, _JOINT_COLOUR, _TIP_COLOUR = (0.82, 0.84, 0.87, 1.0), (0.2, 0.3, 0.42, 1.0), (0.8, 0.2, 0.15, 1.0)
 _STAND_COLOUR, _TABLE_COLOUR = (0.4, 0.42, 0.45, 1.0), (0.72, 0.6, 0.45, 0.35)
-_ARM_FLOOR = -0.6  # [m] below the arm's base, which stands on a column
+ARM_FLOOR = -0.6  # [m] below the arm's base, which stands on a column
 # [m] Radii of the first link and of the last per m of the arm's length.
 _FIRST_RADIUS, _LAST_RADIUS = 0.04, 0.022
 _TABLE_FOOT = (0.4, 0.4, 0.2)  # [m] half sizes of what is drawn below the table
@@ -42,7 +42,7 @@ def make_drawing(pool: RobotPool, row: int) -> mujoco.MjModel:
         place_bodies(spec, pos, quat)
         add_links(spec, pos, quat)
         add_goal(spec)
-        add_surroundings(spec, _ARM_FLOOR)
+        add_surroundings(spec, ARM_FLOOR)
     return spec.compile()
 
 
@@ -64,7 +64,7 @@ def add_links(spec: mujoco.MjSpec, pos: np.ndarray, quat: np.ndarray) -> None:
             add_capsule(body, np.zeros(3), target, radius, _LINK_COLOUR)
     for body, radius in zip(bodies[1:], radii[1:], strict=True):
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[1.15 * radius, 1.3 * radius, 0], rgba=_JOINT_COLOUR)
-    add_capsule(spec.worldbody, np.array([0.0, 0.0, _ARM_FLOOR]), np.zeros(3), 1.5 * radii[0], _STAND_COLOUR)
+    add_capsule(spec.worldbody, np.array([0.0, 0.0, ARM_FLOOR]), np.zeros(3), 1.5 * radii[0], _STAND_COLOUR)
 
 
 def gripper_end(spec: mujoco.MjSpec, pos: np.ndarray, quat: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from hcp_jax.rendering.drawing import make_drawing, put_goal
-from hcp_jax.rendering.graphics import GraphicsError, choose_backend, renderer_class
+from hcp_jax.rendering.graphics import GraphicsError, renderer_class
 from hcp_jax.rendering.recording import Recording
 
 FORMATS = (".mp4", ".gif", ".png")
@@ -21,7 +21,9 @@ _LAST_FRAME_SECONDS = 1.0  # how long the end is shown
 _LARGE, _SMALL = (640, 480), (320, 240)  # width and height of a picture of one robot, and of one of several
 _TRAIL_RADIUS, _TRAIL_COLOUR = 0.004, np.array([0.8, 0.2, 0.15, 1.0], np.float32)  # of the path of the point of interest
 _ARM_VIEW, _HOPPER_VIEW = (118.0, -16.0), (90.0, -8.0)  # azimuth and elevation [degrees]
-_MARGIN = 1.05
+_MARGIN = 1.25  # of the field of view over what has to be seen: links have a width, and there is the caption
+_HOPPER_ROOM = 1.2  # height of the picture over that of a hopper's highest joint
+_ASPECT = _LARGE[0] / _LARGE[1]
 _FIELD_OF_VIEW = 45.0  # [degrees] vertical, MuJoCo's default
 _CAPTION_COLOUR, _SUCCESS_COLOUR = (25, 30, 40), (10, 110, 40)
 
@@ -41,18 +43,24 @@ def check_output(path: pathlib.Path) -> None:
             ) from error
 
 
-def write_film(recording: Recording, path: pathlib.Path, num_pictures: int = 5) -> None:
+def write_film(recording: Recording, path: pathlib.Path, backend: str, num_pictures: int = 5) -> None:
     """Draws a recording into an `.mp4` or `.gif`, or as a `.png` with a row of `num_pictures` for each robot.
 
+    Args:
+        recording: at most `MAX_ROBOTS` robots.
+        path: a file that does not exist yet; its folder is made.
+        backend: as of `choose_backend`.
+        num_pictures: in a `.png`; 1 shows the ends of all episodes in a grid.
+
     Raises:
-        GraphicsError: the file exists or is of no known format, or this machine cannot draw or encode it.
+        GraphicsError: the file exists or is of no known format, or this machine cannot encode it.
     """
     check_output(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(f".{path.name}.part{path.suffix}")
     with contextlib.ExitStack() as stack:
         stack.callback(unfinished.unlink, missing_ok=True)
-        painters = stack.enter_context(open_painters(recording))
+        painters = stack.enter_context(open_painters(recording, backend))
         if path.suffix == ".png":
             draw_strip(recording, painters, num_pictures).save(unfinished, optimize=True)
         else:
@@ -126,9 +134,9 @@ class Painter:
 
 
 @contextlib.contextmanager
-def open_painters(recording: Recording) -> Iterator[list[Painter]]:
+def open_painters(recording: Recording, backend: str) -> Iterator[list[Painter]]:
     """A painter for each robot, all with the same view."""
-    renderer = renderer_class(choose_backend())
+    renderer = renderer_class(backend)
     count = recording.pool.num_robots
     with contextlib.ExitStack() as stack:
         painters = [Painter(recording, row, _LARGE if count == 1 else _SMALL, renderer) for row in range(count)]
@@ -139,18 +147,29 @@ def open_painters(recording: Recording) -> Iterator[list[Painter]]:
 
 
 def frame_all(painters: list[Painter], is_hopper: bool) -> None:
-    """Sets the painters' cameras so that all that moves is in each picture; those of hoppers move along."""
+    """Sets the painters' cameras so that all bodies are in each picture during the whole episode; hoppers' move along."""
     points = np.concatenate([painter.bodies.reshape(-1, 3) for painter in painters])
     if is_hopper:
         height = points[:, 2].max()
-        centre, distance = np.array([0.0, 0.0, 0.55 * height]), 2.2 * height
-    else:
-        low, high = points.min(axis=0), points.max(axis=0)
-        centre = (low + high) / 2
-        radius = np.linalg.norm(points - centre, axis=1).max()
-        distance = _MARGIN * radius / math.sin(math.radians(_FIELD_OF_VIEW / 2))
+        points = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, _HOPPER_ROOM * height]])
+    centre, distance = fit_camera(points, *(_HOPPER_VIEW if is_hopper else _ARM_VIEW))
     for painter in painters:
         painter.camera.lookat, painter.camera.distance = centre, distance
+
+
+def fit_camera(points: np.ndarray, azimuth: float, elevation: float) -> tuple[np.ndarray, float]:
+    """What a camera that looks along azimuth and elevation [degrees] has to look at [3] m, and from how far away [m], to have
+    `points` [P, 3] m in a picture of 4 to 3 with some margin."""
+    turn, rise = math.radians(azimuth), math.radians(elevation)
+    forward = np.array([math.cos(rise) * math.cos(turn), math.cos(rise) * math.sin(turn), math.sin(rise)])
+    right = np.array([math.sin(turn), -math.cos(turn), 0.0])
+    axes = np.stack([right, np.cross(right, forward), forward])
+    seen = points @ axes.T
+    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    across, up, depth = (seen - middle).T
+    slope = math.tan(math.radians(_FIELD_OF_VIEW / 2)) / _MARGIN
+    distance = np.max(np.maximum(np.abs(up) / slope, np.abs(across) / (slope * _ASPECT)) - depth)
+    return middle @ axes, float(distance)
 
 
 def add_trail(scene: mujoco.MjvScene, path: np.ndarray) -> None:
