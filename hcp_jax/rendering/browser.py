@@ -20,7 +20,7 @@ from hcp_jax.rendering.recording import default_robots
 from hcp_jax.training import run_folder
 from hcp_jax.training.warm_start import load_policy
 
-_SETTLE_SECONDS = 0.3  # since the last change of a slider, before the arm is built anew
+SETTLE_SECONDS = 0.3  # since the last change of a slider, before the arm is built anew
 _SLIDER_STEP = 0.005  # [m]
 _TICKS_PER_PICTURE = 2
 _CAMERA = ((1.3, -1.9, 0.9), (0.3, 0.0, 0.1))  # [m] where it stands and what it looks at
@@ -54,6 +54,7 @@ class ArmView:
         arm: what moves.
         robot_type, lengths, new_pose: the controls; lengths are by name of the link, changes from nominal in m.
         gizmo: what the goal is dragged by.
+        shapes: handles of what is seen, by the drawing's number of each geom.
     """
 
     def __init__(self, server, run: ArmExperiment, params):
@@ -67,13 +68,13 @@ class ArmView:
         self.server, self.arm = server, LiveArm(run, params)
         self._within = run.config.env.success_distance
         self._rebuild_at, self._asks_pose, self._asked_goal = math.inf, False, None
-        self._shapes, self._num_ticks = {}, 0
+        self.shapes, self._num_ticks = {}, 0
         self._add_controls([name for name, _ in default_robots(run.config)], run.config.pool)
         self._rebuild()
         self.gizmo = server.scene.add_transform_controls(
             "/goal", scale=0.15, disable_rotations=True, disable_sliders=True, position=self.arm.goal
         )
-        self.gizmo.on_update(self._ask_goal)
+        self.gizmo.on_update(lambda _: self.ask_goal(np.asarray(self.gizmo.position)))
         server.scene.set_up_direction("+z")
         server.scene.add_grid("/floor", 4.0, 4.0, position=(0.0, 0.0, ARM_FLOOR), cell_size=0.25, plane_opacity=0.4)
         server.initial_camera.position, server.initial_camera.look_at = _CAMERA
@@ -102,6 +103,10 @@ class ArmView:
         if self._num_ticks % _TICKS_PER_PICTURE == 0:
             self._show()
 
+    def ask_goal(self, goal: np.ndarray) -> None:
+        """Moves the goal to `goal` [3] m with the next tick."""
+        self._asked_goal = goal
+
     def _add_controls(self, types: list[str], pool_config: ArmPoolConfig) -> None:
         gui = self.server.gui
         self.robot_type = gui.add_dropdown("arm type", types)
@@ -113,7 +118,7 @@ class ArmView:
                 if low < high:
                     middle = float(np.clip(0.0, low, high))
                     self.lengths[link] = gui.add_slider(link, low, high, _SLIDER_STEP, middle)
-                    self.lengths[link].on_update(lambda _: self._ask_robot(_SETTLE_SECONDS))
+                    self.lengths[link].on_update(lambda _: self._ask_robot(SETTLE_SECONDS))
         self.new_pose = gui.add_button("new start pose")
         self.new_pose.on_click(lambda _: self._ask_pose())
         self.status = gui.add_markdown("")
@@ -124,19 +129,16 @@ class ArmView:
     def _ask_pose(self) -> None:
         self._asks_pose = True
 
-    def _ask_goal(self, _) -> None:
-        self._asked_goal = np.asarray(self.gizmo.position)
-
     def _rebuild(self) -> None:
         """Makes the arm that the controls say, and its shapes."""
         self.status.content = "compiling the policy for this arm ..."
         lengths = [self.lengths[link].value if link in self.lengths else 0.0 for link in LINKS]
         self.arm.set_robot(self.robot_type.value, np.asarray(lengths))
-        for shape in self._shapes.values():
+        for shape in self.shapes.values():
             shape.remove()
         self._model = make_drawing(self.arm.pool, 0)
         self._data = mujoco.MjData(self._model)
-        self._shapes = {i: self._add_shape(i) for i in range(self._model.ngeom) if self._model.geom_type[i] != _PLANE}
+        self.shapes = {i: self._add_shape(i) for i in range(self._model.ngeom) if self._model.geom_type[i] != _PLANE}
         self._show()
 
     def _add_shape(self, index: int):
@@ -159,11 +161,11 @@ class ArmView:
         mujoco.mj_kinematics(self._model, self._data)
         quat = np.zeros(4)
         with self.server.atomic():
-            for index, shape in self._shapes.items():
+            for index, shape in self.shapes.items():
                 mujoco.mju_mat2Quat(quat, self._data.geom_xmat[index])
                 shape.position, shape.wxyz = self._data.geom_xpos[index], quat
             for name in GOAL_GEOMS:
-                self._shapes[self._model.geom(name).id].color = REACHED_GOAL if is_reached else OPEN_GOAL
+                self.shapes[self._model.geom(name).id].color = REACHED_GOAL if is_reached else OPEN_GOAL
             self.status.content = f"{100 * self.arm.distance:.1f} cm from the goal{', reached' if is_reached else ''}"
 
 

@@ -35,14 +35,14 @@ def make_drawing(pool: RobotPool, row: int) -> mujoco.MjModel:
         hopper.edit_spec(spec, {name: values[row] for name, values in pool.hardware.items()})
         spec.delete(spec.geom("floor"))
         spec.delete(spec.light("sun"))
-        add_surroundings(spec, 0.0)
+        add_surroundings(spec, 0.0, spec.body("torso"))
     else:
         count = int(pool.hardware["joint_mask"][row].sum())
         pos, quat = (pool.hardware[f"chain_{name}"][row, : count + 1] for name in ("pos", "quat"))
         place_bodies(spec, pos, quat)
         add_links(spec, pos, quat)
         add_goal(spec)
-        add_surroundings(spec, ARM_FLOOR)
+        add_surroundings(spec, ARM_FLOOR, spec.worldbody)
     return spec.compile()
 
 
@@ -57,7 +57,7 @@ def add_links(spec: mujoco.MjSpec, pos: np.ndarray, quat: np.ndarray) -> None:
         for geom in spec.body("table").geoms:
             geom.rgba = _TABLE_COLOUR
     else:
-        spec.body("tool").add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[radii[-1], 0, 0], rgba=_TIP_COLOUR)
+        spec.body("tool").add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[1.2 * radii[-1], 0, 0], rgba=_TIP_COLOUR)
     bodies = [spec.worldbody, *(spec.body(f"slot{i}") for i in range(count))]
     for body, radius, target in zip(bodies, radii, [*pos[:-1], end], strict=True):
         if np.linalg.norm(target) > _MIN_LENGTH:
@@ -92,8 +92,8 @@ def add_goal(spec: mujoco.MjSpec) -> None:
         goal.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[radius, 0, 0], rgba=[*OPEN_GOAL, alpha])
 
 
-def add_surroundings(spec: mujoco.MjSpec, floor: float) -> None:
-    """A tiled floor at height `floor` [m] that never ends, sky and sun."""
+def add_surroundings(spec: mujoco.MjSpec, floor: float, lit: mujoco.MjsBody) -> None:
+    """A tiled floor at height `floor` [m] that never ends, sky, and a sun that goes with the body `lit`."""
     texture, role = mujoco.mjtTexture, mujoco.mjtTextureRole.mjTEXROLE_RGB
     spec.add_texture(
         name="sky", type=texture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
@@ -106,16 +106,11 @@ def add_surroundings(spec: mujoco.MjSpec, floor: float) -> None:
     tiles = spec.add_material(name="tiles", texrepeat=[1, 1], texuniform=True)
     tiles.textures[role] = "tiles"
     spec.worldbody.add_geom(
-        name="ground",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[0, 0, 0.1],
-        pos=[0, 0, floor],
-        material="tiles",
-        rgba=[1, 1, 1, 1],
+        type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.1], pos=[0, 0, floor], material="tiles", rgba=[1, 1, 1, 1]
     )
-    spec.worldbody.add_light(
-        name="sky_light", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=[1, -2, 4], dir=[-0.2, 0.45, -1],
-        diffuse=[0.6, 0.6, 0.6], castshadow=True,
+    lit.add_light(
+        name="sunlight", mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACK, type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        pos=[1, -2, 4], dir=[-0.2, 0.45, -1], diffuse=[0.6, 0.6, 0.6], castshadow=True,
     )  # fmt: skip
     spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1280, 960

@@ -4,6 +4,8 @@ import contextlib
 import itertools
 import math
 import pathlib
+import subprocess
+import tempfile
 from collections.abc import Iterator
 
 import mujoco
@@ -64,8 +66,12 @@ def write_film(recording: Recording, path: pathlib.Path, backend: str, num_pictu
         if path.suffix == ".png":
             draw_strip(recording, painters, num_pictures).save(unfinished, optimize=True)
         else:
-            frames = (draw_frame(painters, step) for step in frame_steps(recording))
-            (write_mp4 if path.suffix == ".mp4" else write_gif)(unfinished, frames)
+            steps = frame_steps(recording)
+            frames = (draw_frame(painters, step) for step in steps)
+            if path.suffix == ".mp4":
+                write_mp4(unfinished, frames)
+            else:
+                write_gif(unfinished, frames, tile([draw_frame(painters, step) for step in (steps[0], steps[-1])], 1))
         unfinished.rename(path)
 
 
@@ -213,20 +219,29 @@ def tile(pictures: list[Image.Image], columns: int) -> Image.Image:
 
 
 def write_mp4(path: pathlib.Path, frames: Iterator[Image.Image]) -> None:
-    import imageio_ffmpeg
+    """H.264, by the ffmpeg that imageio-ffmpeg brings. (Its own writer forks, which JAX warns about.)"""
+    from imageio_ffmpeg import get_ffmpeg_exe
 
     first = next(frames)
-    writer = imageio_ffmpeg.write_frames(str(path), first.size, fps=FRAME_RATE, quality=7, ffmpeg_log_level="error")
-    writer.send(None)
-    try:
-        for frame in itertools.chain([first], frames):
-            writer.send(frame.tobytes())
-    finally:
-        writer.close()
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{first.width}x{first.height}", "-r", str(FRAME_RATE), "-i", "-"]
+    target = ["-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(path)]
+    command = [get_ffmpeg_exe(), "-loglevel", "error", *source, *target]
+    with tempfile.TemporaryFile() as log:
+        encoder = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=log)
+        try:
+            assert encoder.stdin is not None
+            with contextlib.suppress(BrokenPipeError), encoder.stdin as pipe:
+                for frame in itertools.chain([first], frames):
+                    pipe.write(frame.tobytes())
+        finally:
+            encoder.wait()
+        if encoder.returncode:
+            log.seek(0)
+            raise GraphicsError(f"--out={path}: ffmpeg ended with {log.read().decode(errors='replace').strip()}")
 
 
-def write_gif(path: pathlib.Path, frames: Iterator[Image.Image]) -> None:
-    """All frames have the colours of the first, so that what stands still is stored once."""
-    first = next(frames).quantize(256)
-    rest = (frame.quantize(palette=first, dither=Image.Dither.NONE) for frame in frames)
+def write_gif(path: pathlib.Path, frames: Iterator[Image.Image], colours: Image.Image) -> None:
+    """All frames have the 256 colours of one picture, so that what stands still is stored once."""
+    palette = colours.quantize(256, method=Image.Quantize.FASTOCTREE)
+    first, *rest = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     first.save(path, save_all=True, append_images=rest, duration=1000 // FRAME_RATE, loop=0)

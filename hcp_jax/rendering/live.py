@@ -35,6 +35,7 @@ class LiveArm:
     Attributes:
         pool: the arm as a pool of one.
         goal_box: [2, 3] m, low and high corner of where goals may be.
+        state: the environment's, of one world.
         distance: [m] of the point of interest from the goal.
     """
 
@@ -53,12 +54,12 @@ class LiveArm:
     @property
     def qpos(self) -> np.ndarray:
         """[7] rad."""
-        return np.asarray(self._state.physics.qpos[0])
+        return np.asarray(self.state.physics.qpos[0])
 
     @property
     def goal(self) -> np.ndarray:
         """[3] m."""
-        return np.asarray(self._state.desired_goal[0])
+        return np.asarray(self.state.desired_goal[0])
 
     def set_robot(self, robot_type: str, length_change: np.ndarray) -> None:
         """Another arm, at a start pose of its own; the goal stays. Takes a second or two: the policy is compiled for it."""
@@ -72,7 +73,7 @@ class LiveArm:
     def restart(self) -> None:
         """Puts the arm at one of its start poses."""
         self._key, key = jax.random.split(self._key)
-        self._state = self._evaluator.env.reset(key, jnp.zeros(1, jnp.int32))
+        self.state = self._evaluator.env.reset(key, jnp.zeros(1, jnp.int32))
         if self._goal is not None:
             self.set_goal(self._goal)
 
@@ -81,9 +82,9 @@ class LiveArm:
         self._goal = np.clip(goal, *self.goal_box)
         desired_goal = jnp.asarray(self._goal, jnp.float32)[None]
         table = self._evaluator.env.task.table_position(desired_goal)
-        self._state = self._state.replace(desired_goal=desired_goal, physics=self._state.physics.replace(mocap_pos=table))
+        self.state = self.state.replace(desired_goal=desired_goal, physics=self.state.physics.replace(mocap_pos=table))
 
     def step(self) -> None:
         """One control step, 20 ms. Goes on after success."""
-        self._state, transition = self._step(self._params, self._state)
+        self.state, transition = self._step(self._params, self.state)
         self.distance = float(transition.distance[0])
