@@ -145,9 +145,10 @@ def open_painters(recording: Recording, backend: str) -> Iterator[list[Painter]]
     renderer = renderer_class(backend)
     count = recording.pool.num_robots
     with contextlib.ExitStack() as stack:
-        painters = [Painter(recording, row, _LARGE if count == 1 else _SMALL, renderer) for row in range(count)]
-        for painter in painters:
-            stack.callback(painter.close)
+        painters = []
+        for row in range(count):
+            painters.append(Painter(recording, row, _LARGE if count == 1 else _SMALL, renderer))
+            stack.callback(painters[row].close)
         frame_all(painters, recording.goal is None)
         yield painters
 

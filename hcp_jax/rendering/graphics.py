@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 BACKENDS = ("egl", "osmesa", "glfw")  # in the order in which they are tried; the last needs a display
-DEBIAN_PACKAGES = "libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
+DEBIAN_PACKAGES = "libegl1 libgl1"  # for EGL; what they depend on draws in software. OSMesa: libosmesa6
 _PROBE = (
     "import mujoco\nwith mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 8, 8) as renderer:\n    renderer.render()"
 )

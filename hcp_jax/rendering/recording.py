@@ -129,24 +129,23 @@ def record_arms(run: ArmExperiment, state, pool: RobotPool, names: Sequence[str]
     episodes, states = evaluator.record(run.learner.policy(state), np.arange(pool.num_robots), key)
     task = evaluator.env.task
     ctrl_dt = task.sim_dt * task.num_substeps
-    outcomes = [
-        "the physics diverged" if diverged
-        else f"reached after {length * ctrl_dt:.1f} s" if success
-        else f"{100 * distance:.0f} cm away"
-        for diverged, success, length, distance in zip(
-            episodes.diverged, episodes.success, episodes.episode_length, episodes.final_distance, strict=True
-        )
-    ]  # fmt: skip
+    columns = (episodes.success, episodes.diverged, episodes.episode_length * ctrl_dt, episodes.final_distance)
     return Recording(
         pool=pool,
         names=tuple(names),
-        outcomes=tuple(outcomes),
+        outcomes=tuple(arm_outcome(*row) for row in zip(*columns, strict=True)),
         qpos=states.qpos,
         goal=episodes.desired_goal,
         success=episodes.success,
         length=episodes.episode_length,
         ctrl_dt=ctrl_dt,
     )
+
+
+def arm_outcome(success: bool, diverged: bool, seconds: float, distance: float) -> str:
+    if diverged:
+        return "the physics diverged"
+    return f"reached after {seconds:.1f} s" if success else f"{100 * distance:.0f} cm away"
 
 
 def record_hoppers(run: HopperExperiment, state, robots: Sequence[Choice], key: jax.Array) -> Recording:
