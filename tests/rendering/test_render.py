@@ -158,11 +158,11 @@ def project(camera: mujoco.MjvCamera, points: np.ndarray, shape: tuple[int, int]
 
 
 def test_an_own_arm_is_filmed_from_its_file(finished_arms, backend, tmp_path, capsys):
-    arguments = [finished_arms, "--robot", robots_path() / "arm_reacher.xml", "--tip", "l6", "--out", tmp_path / "own.png"]
-    render.main([str(argument) for argument in arguments])
+    out, file = tmp_path / "own.png", robots_path() / "arm_reacher.xml"
+    render.main([str(finished_arms), "--robot", str(file), "--tip", "l6", "--out", str(out), "--pictures", "1"])
     assert "arm_reacher: " in capsys.readouterr().out
-    with Image.open(tmp_path / "own.png") as strip:
-        assert strip.size == (5 * 640, 480)
+    with Image.open(out) as picture:
+        assert picture.size == (640, 480)
 
 
 BAD_ARGUMENTS = {

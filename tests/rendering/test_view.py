@@ -1,3 +1,5 @@
+import sys
+
 import numpy as np
 import pytest
 import viser
@@ -57,10 +59,22 @@ def test_type_and_lengths_make_another_arm_and_the_goal_stays(arm_view, monkeypa
     np.testing.assert_allclose(arm_view.arm.goal, goal)
 
 
-def test_a_policy_of_hoppers_is_refused_in_one_line(finished_run, capsys):
+def fails(capsys, arguments) -> str:
+    """Runs the command, which must end with code 2 and one line; returns the line."""
     with pytest.raises(SystemExit) as exit_info:
-        view.main([str(finished_run)])
+        view.main([str(argument) for argument in arguments])
     assert exit_info.value.code == 2
     error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert "the view shows arms" in error
+    assert error.count("\n") == 1, error
+    return error
+
+
+def test_bad_arguments_give_one_line(finished_run, tmp_path, capsys):
+    assert "the view shows arms" in fails(capsys, [finished_run])
+    assert "--port=0: expected 1 to 65535" in fails(capsys, [finished_run, "--port", "0"])
+    assert "no such run folder" in fails(capsys, [tmp_path / "nowhere"])
+
+
+def test_without_viser_one_line_names_the_extra(finished_arms, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    assert "extra viz: pip install viser" in fails(capsys, [finished_arms])
