@@ -23,7 +23,7 @@ from hcp_jax.training.warm_start import load_policy
 SETTLE_SECONDS = 0.3  # since the last change of a slider, before the arm is built anew
 _SLIDER_STEP = 0.005  # [m]
 _TICKS_PER_PICTURE = 2
-_CAMERA = ((1.3, -1.9, 0.9), (0.3, 0.0, 0.1))  # [m] where it stands and what it looks at
+_CAMERA = ((0.95, -1.3, 0.7), (0.4, 0.0, 0.1))  # [m] where it stands and what it looks at
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 
 

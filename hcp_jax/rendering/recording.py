@@ -36,7 +36,7 @@ class Recording:
         outcomes: [B] how their episodes ended, in words.
         qpos: [T + 1, B, nq], from the start on; of a robot up to its `length`.
         goal: [B, 3] m of arms, None of hoppers.
-        success: [B] bool, whether the goal was reached, or the hopper never fell.
+        success: [B] bool, whether the goal was reached, or the hopper was up to the end.
         length: [B] control steps of each episode.
         ctrl_dt: [s] between two states.
     """
@@ -149,7 +149,7 @@ def arm_outcome(success: bool, diverged: bool, seconds: float, distance: float) 
 
 
 def record_hoppers(run: HopperExperiment, state, robots: Sequence[Choice], key: jax.Array) -> Recording:
-    """One episode of each hopper; it ends with a fall or at the task's time limit."""
+    """One episode of each hopper; it ends at the task's limits of height, pitch and time."""
     config = run.config.pool
     assert isinstance(config, PoolConfig)
     pool = choose_robots(robots, lambda name, count: make_heldout_pool(config, count) if name == "hopper" else run.train_pool)
@@ -160,10 +160,10 @@ def record_hoppers(run: HopperExperiment, state, robots: Sequence[Choice], key: 
     episodes, states = evaluator.record(params, run.ppo.visible(state, v_h), np.arange(len(robots)), key)
     task = evaluator.env.task
     ctrl_dt = task.sim_dt * task.num_substeps
-    fell = episodes.episode_length < task.episode_length
+    is_short = episodes.episode_length < task.episode_length
     outcomes = [
-        f"return {value:.0f}, {'fell after' if is_down else 'up for'} {length * ctrl_dt:.1f} s"
-        for value, is_down, length in zip(episodes.episode_return, fell, episodes.episode_length, strict=True)
+        f"return {value:.0f}, {'ended after' if is_down else 'up for'} {length * ctrl_dt:.1f} s"
+        for value, is_down, length in zip(episodes.episode_return, is_short, episodes.episode_length, strict=True)
     ]
     return Recording(
         pool=pool,
@@ -171,7 +171,7 @@ def record_hoppers(run: HopperExperiment, state, robots: Sequence[Choice], key: 
         outcomes=tuple(outcomes),
         qpos=states.qpos,
         goal=None,
-        success=~fell,
+        success=~is_short,
         length=episodes.episode_length,
         ctrl_dt=ctrl_dt,
     )
