@@ -38,8 +38,10 @@ def check_output(path: pathlib.Path) -> None:
         raise GraphicsError(f"--out={path}: already exists; choose another name")
     if path.suffix == ".mp4":
         try:
-            import imageio_ffmpeg  # noqa: F401
-        except ImportError as error:
+            from imageio_ffmpeg import get_ffmpeg_exe
+
+            get_ffmpeg_exe()
+        except (ImportError, RuntimeError) as error:
             raise GraphicsError(
                 f"--out={path}: .mp4 needs the extra viz: pip install imageio-ffmpeg (a .gif needs nothing)"
             ) from error

@@ -14,7 +14,7 @@ _MAX_SECONDS = 60.0
 
 
 class GraphicsError(RuntimeError):
-    """Nothing can be drawn on this machine, or not in the format asked for."""
+    """Nothing can be drawn on this machine, or not into the file asked for."""
 
 
 def choose_backend() -> str:
