@@ -23,9 +23,11 @@ def choose_backend() -> str:
     Each is tried in a process of its own: a library that fails to load leaves PyOpenGL unusable.
 
     Raises:
-        GraphicsError: none of them does.
+        GraphicsError: none of them does, or MUJOCO_GL names none of them.
     """
     asked = os.environ.get("MUJOCO_GL", "").lower().strip()
+    if asked and asked not in BACKENDS:
+        raise GraphicsError(f"MUJOCO_GL={asked}: expected one of {', '.join(BACKENDS)}, or nothing")
     for name in (asked,) if asked else BACKENDS:
         environment = os.environ | {"MUJOCO_GL": name}
         command = [sys.executable, "-c", _PROBE]
@@ -34,8 +36,8 @@ def choose_backend() -> str:
                 return name
         except subprocess.TimeoutExpired:
             continue
-    tried = f"MUJOCO_GL={asked}" if asked else "no OpenGL"
-    raise GraphicsError(f"{tried} works here: expected EGL or OSMesa; on Debian: apt-get install {DEBIAN_PACKAGES}")
+    failed = f"MUJOCO_GL={asked} does not draw here" if asked else "no OpenGL draws here"
+    raise GraphicsError(f"{failed}: expected EGL or OSMesa; on Debian: apt-get install {DEBIAN_PACKAGES}")
 
 
 def renderer_class(backend: str) -> type:

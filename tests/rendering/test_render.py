@@ -202,7 +202,9 @@ def test_without_opengl_one_line_names_the_debian_packages(finished_arms, tmp_pa
     line = fails(capsys, [finished_arms, "--grid", "--out", tmp_path / "x.gif"])
     assert "apt-get install libegl1" in line
     monkeypatch.setenv("MUJOCO_GL", "osmesa")
-    assert "MUJOCO_GL=osmesa" in fails(capsys, [finished_arms, "--grid", "--out", tmp_path / "x.gif"])
+    assert "MUJOCO_GL=osmesa does not draw" in fails(capsys, [finished_arms, "--grid", "--out", tmp_path / "x.gif"])
+    monkeypatch.setenv("MUJOCO_GL", "glx")
+    assert "MUJOCO_GL=glx: expected one of egl," in fails(capsys, [finished_arms, "--grid", "--out", tmp_path / "x.gif"])
 
 
 def test_without_the_encoder_one_line_names_the_extra(finished_arms, tmp_path, capsys, monkeypatch):
