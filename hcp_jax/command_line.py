@@ -19,12 +19,22 @@ from hcp_jax.hardware.pool import PoolError
 from hcp_jax.hardware.ranges import RangeError
 from hcp_jax.hardware.robot_file import RobotFileError
 from hcp_jax.physics.base import PhysicsOverflowError
+from hcp_jax.rendering.graphics import GraphicsError
 from hcp_jax.training.checkpoint import CheckpointError
 from hcp_jax.training.loop import NonFiniteError
 from hcp_jax.training.run_folder import RunFolderError
 
 BAD_INPUT, BROKEN = 2, 1
-_USER_ERRORS = (ConfigError, RangeError, RunFolderError, CheckpointError, PoolError, RobotFileError, RecordError)
+_USER_ERRORS = (
+    ConfigError,
+    RangeError,
+    RunFolderError,
+    CheckpointError,
+    PoolError,
+    RobotFileError,
+    RecordError,
+    GraphicsError,
+)
 _OVERRIDE = re.compile(r"--config\.([^=\s]+)(=.*)?$", re.DOTALL)
 
 

@@ -108,12 +108,10 @@ def edit_spec(spec: mujoco.MjSpec, chain: Chain) -> None:
     n = chain.num_joints
     mass, com = chain.padded("mass"), chain.padded("com")
     inertia_quat, inertia = chain.padded("inertia_quat"), chain.padded("inertia")
-    pos, quat = np.zeros((MAX_JOINTS, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (MAX_JOINTS, 1))
-    pos[:n], quat[:n] = chain.pos[:n], chain.quat[:n]
+    place_bodies(spec, chain.pos, chain.quat)
     for i in range(MAX_JOINTS):
         active = i < n
         body, joint = spec.body(f"slot{i}"), spec.joint(f"slot{i}")
-        body.pos, body.quat = pos[i], quat[i]
         body.mass = mass[i] if active else _NO_MASS
         body.ipos, body.iquat = (com[i], inertia_quat[i]) if active else (_PADDED_COM, _PADDED_INERTIA_QUAT)
         body.inertia = inertia[i] if active else np.full(3, _NO_INERTIA)
@@ -124,8 +122,15 @@ def edit_spec(spec: mujoco.MjSpec, chain: Chain) -> None:
         gear = np.zeros(6)
         gear[0] = chain.torque_limit[i] if active else 0.0
         spec.actuator(f"slot{i}").gear = gear
+
+
+def place_bodies(spec: mujoco.MjSpec, pos: np.ndarray, quat: np.ndarray) -> None:
+    """Puts the slots of a chain template, and its tool, where an arm of n joints has them: pos [n + 1, 3], quat [n + 1, 4]."""
+    for i in range(MAX_JOINTS):
+        body = spec.body(f"slot{i}")
+        body.pos, body.quat = (pos[i], quat[i]) if i < len(pos) - 1 else (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
     tool = spec.body("tool")
-    tool.pos, tool.quat = chain.pos[n], chain.quat[n]
+    tool.pos, tool.quat = pos[-1], quat[-1]
 
 
 def _joints_towards(model: mujoco.MjModel, body: int) -> list[int]:
