@@ -18,6 +18,7 @@ LAYERS = [
     "gym",
     "training",
     "evaluation",
+    "deployment",
 ]
 
 

@@ -7,6 +7,7 @@ and actions of every arm have the same size, with zeros at the end where joints 
 
 import dataclasses
 import itertools
+import xml.etree.ElementTree as ElementTree
 
 import mujoco
 import numpy as np
@@ -104,13 +105,13 @@ def read_chain(model: mujoco.MjModel, tip_site: str = TIP_SITE) -> Chain:
 
 
 def edit_spec(spec: mujoco.MjSpec, chain: Chain) -> None:
-    """Writes `chain` into a chain template (`chain_reacher.xml`, `chain_peg.xml`)."""
+    """Writes `chain` into a chain template (`chain_reacher.xml`, `chain_peg.xml`), whose slots beyond it may be gone."""
     n = chain.num_joints
     mass, com = chain.padded("mass"), chain.padded("com")
     inertia_quat, inertia = chain.padded("inertia_quat"), chain.padded("inertia")
     pos, quat = np.zeros((MAX_JOINTS, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (MAX_JOINTS, 1))
     pos[:n], quat[:n] = chain.pos[:n], chain.quat[:n]
-    for i in range(MAX_JOINTS):
+    for i in range(len(spec.joints)):
         active = i < n
         body, joint = spec.body(f"slot{i}"), spec.joint(f"slot{i}")
         body.pos, body.quat = pos[i], quat[i]
@@ -126,6 +127,23 @@ def edit_spec(spec: mujoco.MjSpec, chain: Chain) -> None:
         spec.actuator(f"slot{i}").gear = gear
     tool = spec.body("tool")
     tool.pos, tool.quat = chain.pos[n], chain.quat[n]
+
+
+def without_padding(template: str, num_joints: int) -> str:
+    """A chain template's MJCF with `num_joints` slots alone, the tool on the last of them."""
+    root = ElementTree.fromstring(template)
+    if num_joints < MAX_JOINTS:
+        parents = {child: parent for parent in root.iter("body") for child in parent}
+        bodies = {body.get("name"): body for body in root.iter("body")}
+        last, tool = bodies[f"slot{num_joints - 1}"], bodies["tool"]
+        parents[tool].remove(tool)
+        last.remove(bodies[f"slot{num_joints}"])
+        last.append(tool)
+        actuators = root.find("actuator")
+        assert actuators is not None
+        for motor in list(actuators)[num_joints:]:
+            actuators.remove(motor)
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def _joints_towards(model: mujoco.MjModel, body: int) -> list[int]:
