@@ -25,13 +25,12 @@ data.qpos[:] = policy["start_angles"][options.start]
 goal = np.array(options.goal or np.mean([policy["goal"]["low"], policy["goal"]["high"]], axis=0))
 substeps = round(policy["control_period"] / model.opt.timestep)
 
-for steps in range(1, policy["episode_length"] + 1):
+steps, distance, within = 0, np.inf, policy["goal"]["success_distance"]
+while distance >= within and steps < policy["episode_length"]:
     observation = np.concatenate([data.qpos, data.qvel, goal]).astype(np.float32)
     (data.ctrl[:],) = session.run(None, {"observation": observation})
     mujoco.mj_step(model, data, nstep=substeps)
     mujoco.mj_kinematics(model, data)
     distance = float(np.linalg.norm(data.site(policy["goal"]["site"]).xpos - goal))
-    if distance < policy["goal"]["success_distance"]:
-        break
-reached = distance < policy["goal"]["success_distance"]
-print(json.dumps({"reached": reached, "steps": steps, "distance": distance}))
+    steps += 1
+print(json.dumps({"reached": distance < within, "steps": steps, "distance": distance}))

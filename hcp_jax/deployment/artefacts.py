@@ -1,4 +1,4 @@
-"""The folder that `export` writes: a policy for one robot as ONNX and as `jax.export`, the robot's model, and what they mean."""
+"""The folder that `export` writes: a policy for one robot as ONNX and as `jax.export`, the robot's model, and what they say."""
 
 import importlib.util
 import json

@@ -1,7 +1,7 @@
 """A JAX function as an ONNX graph: its jaxpr, primitive by primitive, with everything computed that no input has a part in.
 
-Needs the package `onnx` (extra `export`). It knows the primitives of the policies. jax2onnx knows more, but its releases for this
-jax ask for an orbax-checkpoint older than ours.
+Needs the package `onnx` (extra `export`). It knows the primitives of the policies. jax2onnx knows more, but its releases for
+this jax ask for an orbax-checkpoint older than ours.
 """
 
 import itertools
