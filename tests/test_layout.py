@@ -17,8 +17,8 @@ LAYERS = [
     "experiment",
     "gym",
     "training",
-    "evaluation",
     "deployment",
+    "evaluation",
 ]
 
 
