@@ -8,7 +8,7 @@ import jax
 import jax.export
 import numpy as np
 
-from hcp_jax.config import ArmConfig, ConfigError
+from hcp_jax.config import ArmConfig, Config, ConfigError
 from hcp_jax.deployment.chosen_robot import ChosenRobot, choose_robot
 from hcp_jax.deployment.robot_model import write_model
 from hcp_jax.deployment.robot_policy import RobotPolicy, make_robot_policy
@@ -55,8 +55,8 @@ def export_policy(
     from hcp_jax.deployment.onnx_graph import to_onnx
 
     run = make_experiment(run_folder.read_config(folder), "native")
-    iteration, state = load_policy(folder, run, best)
     robot = choose_robot(run, robot_name, base, tip)
+    iteration, state = load_policy(folder, run, best)
     policy = make_robot_policy(run, state, robot)
     task, size = run.make_env(robot.pool).task, len(policy.observation)
     with jax.default_matmul_precision("highest"):
@@ -66,29 +66,39 @@ def export_policy(
     observation = example_observation(run.config.task, robot, size)
     description = {
         "format": _FORMAT,
+        **describe_source(run.config, folder, iteration),
         "robot": robot.name,
-        "run": str(folder),
-        "task": run.config.task,
-        "algorithm": run.config.algorithm,
-        "encoding": run.config.encoding,
-        "env_steps": iteration * run.config.batch_size,
-        "commit": run_folder.read_commit(),
-        "jax": jax.__version__,
+        "units": "SI: s, m, rad, N m",
         "control_period": task.sim_dt * task.num_substeps,
         "episode_length": task.episode_length,
         "input": describe_input(policy),
         "output": describe_output(policy, robot),
-        **(describe_arm_task(run.config.task, run.config.env, robot) if isinstance(run.config.env, ArmConfig) else {}),
+        **describe_arm_task(run.config, robot),
         "example": {INPUT: observation.tolist(), OUTPUT: np.asarray(jitted(observation)).tolist()},
-        "units": "SI: s, m, rad, N m",
     }
-    model = write_model(robot, task.sim_dt, run.config.env.integrator)
+    files = {
+        ONNX_FILE: graph.SerializeToString(),
+        JAX_FILE: exported.serialize(),
+        MODEL_FILE: write_model(robot, task.sim_dt, run.config.env.integrator).encode(),
+        DESCRIPTION_FILE: (json.dumps(description, indent=1) + "\n").encode(),
+    }
     out.mkdir(parents=True)
-    (out / ONNX_FILE).write_bytes(graph.SerializeToString())
-    (out / JAX_FILE).write_bytes(exported.serialize())
-    (out / MODEL_FILE).write_text(model)
-    (out / DESCRIPTION_FILE).write_text(json.dumps(description, indent=1) + "\n")
+    for name, content in files.items():
+        (out / name).write_bytes(content)
     return description
+
+
+def describe_source(config: Config, folder: pathlib.Path, iteration: int) -> dict:
+    """Where the policy is from, and what wrote the files."""
+    return {
+        "run": str(folder),
+        "task": config.task,
+        "algorithm": config.algorithm,
+        "encoding": config.encoding,
+        "checkpoint_env_steps": iteration * config.batch_size,
+        "commit": run_folder.read_commit(),
+        "jax": jax.__version__,
+    }
 
 
 def describe_input(policy: RobotPolicy) -> dict:
@@ -104,15 +114,17 @@ def describe_output(policy: RobotPolicy, robot: ChosenRobot) -> dict:
     return {"name": OUTPUT, "dtype": "float32", "shape": [len(entries)], "entries": entries}
 
 
-def describe_arm_task(task: str, config: ArmConfig, robot: ChosenRobot) -> dict:
-    """Where the goals and the start poses of training were, and what counted as success."""
+def describe_arm_task(config: Config, robot: ChosenRobot) -> dict:
+    """Where an arm's goals and start poses of training were, what counted as success, and the noise; nothing for a hopper."""
+    if not isinstance(config.env, ArmConfig):
+        return {}
     low, high = REACHER_GOALS
-    if task != "reacher":
-        low, high = (tuple(np.add(HOLE, side * config.random_hole).tolist()) for side in (-0.5, 0.5))
+    if config.task != "reacher":
+        low, high = (tuple(np.add(HOLE, side * config.env.random_hole).tolist()) for side in (-0.5, 0.5))
     starts = robot.pool.hardware["start_angles"][0, :, : len(robot.joints)]
     return {
-        "goal": {"site": TIP_SITE, "low": list(low), "high": list(high), "success_distance": config.success_distance},
-        "observation_noise": config.observation_noise,
+        "goal": {"site": TIP_SITE, "low": low, "high": high, "success_distance": config.env.success_distance},
+        "observation_noise": config.env.observation_noise,
         "start_angles": np.round(starts, 6).tolist(),
     }
 

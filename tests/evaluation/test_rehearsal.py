@@ -85,6 +85,7 @@ def test_an_episode_ends_where_the_goal_is_reached(arm):
     assert (trial.success, trial.episode_length) == (True, 1)
 
 
+@pytest.mark.slow
 def test_the_command_writes_each_goal_under_both_conditions(finished_arms, tmp_path, capsys):
     rehearse.main([str(finished_arms), "--robot", "H:1", "--goals", "3", "--json", str(tmp_path / "record.json")])
     record = json.loads((tmp_path / "record.json").read_text())
