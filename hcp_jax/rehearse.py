@@ -37,12 +37,12 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def print_record(record: dict) -> None:
-    table = Table(title=f"{record['run']} on {record['robot']}: distance from the goal at the end [m]")
+    table = Table(title=f"{record['run']} on {record['robot']}: quantiles of the final distance [m]")
     table.add_column("conditions")
     table.add_column("success [%]", justify="right")
     shares = next(iter(record["conditions"].values()))["final_distance_quantiles"]
     for share in shares:
-        table.add_column(f"{float(share):.0%} within", justify="right")
+        table.add_column(f"{float(share):.0%}", justify="right")
     for name, row in record["conditions"].items():
         distances = (f"{value:.3f}" for value in row["final_distance_quantiles"].values())
         table.add_row(name, f"{row['success']:.0f}", *distances)

@@ -85,5 +85,7 @@ def _check_kind(name: str, kind: str, kinds: Sequence[str]) -> None:
 def _joint_names(run: ArmExperiment | HopperExperiment, pool: RobotPool) -> tuple[str, ...]:
     if isinstance(run, HopperExperiment):
         return hopper.JOINTS
-    removed = arm.REMOVED_JOINTS[arm.TYPES[int(pool.hardware["type"][0, 0])]]
-    return tuple(joint for joint in arm.JOINTS if joint not in removed)
+    number = int(pool.hardware["type"][0, 0])
+    if number < 0:  # somebody's arm that was trained on
+        return tuple(f"joint {slot}" for slot in range(int(pool.hardware["joint_mask"][0].sum())))
+    return tuple(joint for joint in arm.JOINTS if joint not in arm.REMOVED_JOINTS[arm.TYPES[number]])
