@@ -70,8 +70,8 @@ class _Graph:
 
     def _run_equation(self, eqn: core.JaxprEqn, inputs: list[Value]) -> list[Value]:
         name = eqn.primitive.name
-        inner = eqn.params.get("jaxpr", eqn.params.get("call_jaxpr"))
-        if isinstance(inner, core.ClosedJaxpr):
+        if name in _CALLS:
+            inner = eqn.params[_CALLS[name]]
             return self.run(inner.jaxpr, inner.consts, inputs)
         if not any(isinstance(value, str) for value in inputs):
             results = eqn.primitive.bind(*inputs, **eqn.params)
@@ -105,6 +105,8 @@ class _Graph:
         return self.add("Reshape", name, self.constant(np.asarray(shape, np.int64)))
 
 
+# Primitives that call a jaxpr once, and the parameter that holds it.
+_CALLS = {"jit": "jaxpr", "pjit": "jaxpr", "closed_call": "call_jaxpr", "custom_jvp_call": "call_jaxpr"}
 # Primitives that ONNX has under another name.
 _SAME = {
     "add": "Add",

@@ -48,6 +48,7 @@ FUNCTIONS = {
     "strides, padding and powers": lambda x: jnp.pad(x[1::2], (2, 1), constant_values=3.0) ** 3,
     "axes that move": lambda x: jnp.moveaxis(x.reshape(1, 2, 3), 1, 2) @ jnp.ones((2, 2)),
     "sums, roots and choices": lambda x: jnp.where(x > 0.1, jnp.sqrt(jnp.sum(x.reshape(2, 3) ** 2, axis=0)).repeat(2), -x),
+    "functions with a derivative of their own": lambda x: jax.nn.relu(x) + jax.nn.selu(x),
     "the same constant twice": lambda x: (x + jnp.full(6, 2.0)) * jnp.full(6, 2.0),
 }
 
@@ -61,5 +62,7 @@ def test_arrays_are_handled_as_jax_handles_them(name, rng):
 def test_what_has_no_translation_is_named():
     with pytest.raises(OnnxError, match="primitive sort has no translation"):
         to_onnx(jnp.sort, 3, "x", "y")
+    with pytest.raises(OnnxError, match="primitive scan has no translation"):
+        to_onnx(lambda x: jax.lax.scan(lambda carry, row: (carry + row, None), x, jnp.ones((2, 3)))[0], 3, "x", "y")
     with pytest.raises(OnnxError, match="does not depend"):
         to_onnx(lambda x: jnp.ones(3), 3, "x", "y")
