@@ -17,6 +17,7 @@ LAYERS = [
     "experiment",
     "gym",
     "training",
+    "deployment",
     "evaluation",
     "reporting",
     "rendering",
