@@ -49,7 +49,6 @@ class LiveArm:
         is_reacher = run.config.task == "reacher"
         self.goal_box = np.asarray(REACHER_GOALS) if is_reacher else np.add(HOLE, [[-HOLE_BOX], [HOLE_BOX]])
         self._goal: np.ndarray | None = None
-        self.distance = np.inf
 
     @property
     def qpos(self) -> np.ndarray:
@@ -71,11 +70,10 @@ class LiveArm:
         self.restart()
 
     def restart(self) -> None:
-        """Puts the arm at one of its start poses."""
+        """Puts the arm at one of its start poses; the goal, drawn for the first arm, stays."""
         self._key, key = jax.random.split(self._key)
         self.state = self._evaluator.env.reset(key, jnp.zeros(1, jnp.int32))
-        if self._goal is not None:
-            self.set_goal(self._goal)
+        self.set_goal(self.goal if self._goal is None else self._goal)
 
     def set_goal(self, goal: np.ndarray) -> None:
         """Moves the goal to `goal` [3] m, clipped to `goal_box`, and the table with it."""
@@ -83,6 +81,7 @@ class LiveArm:
         desired_goal = jnp.asarray(self._goal, jnp.float32)[None]
         table = self._evaluator.env.task.table_position(desired_goal)
         self.state = self.state.replace(desired_goal=desired_goal, physics=self.state.physics.replace(mocap_pos=table))
+        self.distance = float(jnp.linalg.norm(self.state.achieved_goal - desired_goal))
 
     def step(self) -> None:
         """One control step, 20 ms. Goes on after success."""

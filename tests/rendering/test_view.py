@@ -33,17 +33,6 @@ def test_the_shapes_move_with_the_arm(arm_view):
     assert np.abs(shape_positions(arm_view) - before).max() > 1e-4
 
 
-def test_a_dragged_goal_is_the_one_that_the_policy_sees(arm_view):
-    arm_view.ask_goal(np.array([0.5, -0.2, 0.1]))
-    arm_view.tick()
-    np.testing.assert_allclose(arm_view.arm.goal, [0.5, -0.2, 0.1], atol=1e-6)
-    tip = np.asarray(arm_view.arm.state.achieved_goal[0])
-    assert arm_view.arm.distance == pytest.approx(np.linalg.norm(tip - [0.5, -0.2, 0.1]), abs=1e-5)
-    arm_view.ask_goal(np.array([5.0, 0.0, 0.1]))
-    arm_view.tick()
-    np.testing.assert_allclose(arm_view.arm.goal, [0.6, 0.0, 0.1], atol=1e-6)
-
-
 def test_type_and_lengths_make_another_arm_and_the_goal_stays(arm_view, monkeypatch):
     goal = arm_view.arm.goal
     arm_view.robot_type.value = "H"
@@ -56,7 +45,21 @@ def test_type_and_lengths_make_another_arm_and_the_goal_stays(arm_view, monkeypa
     change[LINKS.index("l2")], change[LINKS.index("l4")] = 0.1, -0.05
     expected = make_one_arm("reacher", "H", change)
     np.testing.assert_allclose(arm_view.arm.pool.hardware["chain_pos"], expected.hardware["chain_pos"])
+    arm_view.new_pose.value = True
+    arm_view.tick()
     np.testing.assert_allclose(arm_view.arm.goal, goal)
+    np.testing.assert_allclose(arm_view.gizmo.position, goal, atol=1e-6)
+
+
+def test_a_dragged_goal_is_the_one_that_the_policy_sees(arm_view):
+    arm_view.ask_goal(np.array([0.5, -0.2, 0.1]))
+    arm_view.tick()
+    np.testing.assert_allclose(arm_view.arm.goal, [0.5, -0.2, 0.1], atol=1e-6)
+    tip = np.asarray(arm_view.arm.state.achieved_goal[0])
+    assert arm_view.arm.distance == pytest.approx(np.linalg.norm(tip - [0.5, -0.2, 0.1]), abs=1e-5)
+    arm_view.ask_goal(np.array([5.0, 0.0, 0.1]))
+    arm_view.tick()
+    np.testing.assert_allclose(arm_view.arm.goal, [0.6, 0.0, 0.1], atol=1e-6)
 
 
 def fails(capsys, arguments) -> str:
