@@ -6,6 +6,7 @@ import math
 import types
 import typing
 
+from hcp_jax.errors import UserError
 from hcp_jax.hardware.arm import OTHER_ARMS, TYPES
 from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS
 from hcp_jax.hardware.encodings import ENCODINGS
@@ -20,7 +21,7 @@ RELABEL_STRATEGIES = ("future", "final", "none")
 NETWORKS = ("flat", "joints")
 
 
-class ConfigError(ValueError):
+class ConfigError(UserError):
     """A setting is unknown, of the wrong type or outside what is allowed. The message names field, value and bounds."""
 
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from hcp_jax.errors import UserError
 from hcp_jax.evaluation.summary import read_curve
 from hcp_jax.training.metrics import METRICS_FILE
 from hcp_jax.training.run_folder import RunFolderError
@@ -17,7 +18,7 @@ from hcp_jax.training.run_folder import RunFolderError
 QUANTILES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0)  # of the final distance, in records of arms
 
 
-class RecordError(ValueError):
+class RecordError(UserError):
     """A published file is damaged, or was written by another version."""
 
 

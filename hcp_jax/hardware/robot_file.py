@@ -15,6 +15,7 @@ from xml.parsers import expat
 import mujoco
 import numpy as np
 
+from hcp_jax.errors import UserError
 from hcp_jax.hardware.chain import MAX_JOINTS, Chain, ChainError, read_chain
 
 MAX_BYTES = 20_000_000
@@ -26,7 +27,7 @@ _TIP_SITE = "hcp_jax tip"  # a name that no file has
 _MIN_INERTIA = 1e-12  # [kg], [kg m^2]
 
 
-class RobotFileError(ValueError):
+class RobotFileError(UserError):
     """A robot file cannot be read as a serial arm."""
 
 

@@ -5,6 +5,8 @@ import os
 import subprocess
 import sys
 
+from hcp_jax.errors import UserError
+
 BACKENDS = ("egl", "osmesa", "glfw")  # in the order in which they are tried; the last needs a display
 DEBIAN_PACKAGES = "libegl1 libgl1"  # for EGL; what they depend on draws in software. OSMesa: libosmesa6
 _PROBE = (
@@ -13,7 +15,7 @@ _PROBE = (
 _MAX_SECONDS = 60.0
 
 
-class GraphicsError(RuntimeError):
+class GraphicsError(UserError):
     """Nothing can be drawn on this machine, or not into the file asked for."""
 
 
