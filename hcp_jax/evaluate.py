@@ -65,7 +65,8 @@ def main(arguments: list[str] | None = None) -> None:
             record = evaluate_hoppers(options.run, fit_steps=options.fit_steps, **settings)
         else:
             if options.robot:
-                settings["own_robot"] = (pathlib.Path(options.robot).stem, load_robot(options.robot, options.base, options.tip))
+                robot = load_robot(options.robot, options.base, options.tip)
+                settings["own_robots"] = {pathlib.Path(options.robot).stem: robot}
             record = evaluate_arms(options.run, types=options.types or (), **settings)
     print_table(record)
     if options.json:

@@ -6,12 +6,13 @@ import itertools
 import jax
 import numpy as np
 
-from hcp_jax.hardware.arm import TYPES
+from hcp_jax.hardware.arm import TYPES, sample_hardware
 from hcp_jax.hardware.arm_encodings import encode_arms
 from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES, make_chain_pool
 from hcp_jax.hardware.chain import MAX_JOINTS, Chain
 from hcp_jax.hardware.inverse_kinematics import solve_positions
 from hcp_jax.hardware.pool import RobotPool
+from hcp_jax.hardware.ranges import ArmRanges
 from hcp_jax.hardware.robot_file import RobotFile, RobotFileError
 from hcp_jax.hardware.start_poses import GRID
 
@@ -46,7 +47,7 @@ def make_own_pool(task: str, robot: RobotFile) -> RobotPool:
         RobotFileError: it reaches no point that the reacher starts from.
     """
     zero = np.clip(np.zeros(MAX_JOINTS), *robot.chain.padded("joint_range").T)[None]
-    pool = _make_pool(task, robot.chain, zero)
+    pool = _make_pool(task, [robot.chain], zero)
     if task == "peg_insertion":
         return pool
     points = np.asarray(list(itertools.product(*GRID)))
@@ -56,11 +57,26 @@ def make_own_pool(task: str, robot: RobotFile) -> RobotPool:
     if not reached.any():
         nearest = float(solution.distance.min())
         raise RobotFileError(f"reaches no point that the reacher starts from; it comes within {nearest:.2f} m of one")
-    return _make_pool(task, robot.chain, np.asarray(solution.angles[reached], np.float64))
+    return _make_pool(task, [robot.chain], np.asarray(solution.angles[reached], np.float64))
 
 
-def _make_pool(task: str, chain: Chain, start_angles: np.ndarray) -> RobotPool:
-    return make_chain_pool(CHAIN_TEMPLATES[task], [chain], np.array([OWN_ID]), np.array([-1]), start_angles[None])
+def make_own_variants(task: str, robot: RobotFile, ranges: ArmRanges, count: int, seed: int) -> RobotPool:
+    """`count` times this arm, with masses (times `ranges.mass_ratio`) and joint dynamics drawn; its links are as long as they
+    are. Raises RobotFileError as `make_own_pool` does."""
+    start_angles = make_own_pool(task, robot).hardware["start_angles"][0]
+    drawn, chain = sample_hardware(ranges, "I", count, seed), robot.chain
+    chains = []
+    for row in range(count):
+        values = {name: rows[row, : chain.num_joints] for name, rows in drawn.items() if name != "length_change"}
+        ratio = values.pop("mass_ratio")
+        chains.append(dataclasses.replace(chain, mass=chain.mass * ratio, inertia=chain.inertia * ratio[:, None], **values))
+    return _make_pool(task, chains, start_angles)
+
+
+def _make_pool(task: str, chains: list[Chain], start_angles: np.ndarray) -> RobotPool:
+    count = len(chains)
+    starts = np.tile(start_angles, (count, 1, 1))
+    return make_chain_pool(CHAIN_TEMPLATES[task], chains, OWN_ID + np.arange(count), np.full(count, -1), starts)
 
 
 def compare_with(own: RobotPool, trained: RobotPool) -> list[Entry]:
