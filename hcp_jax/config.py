@@ -72,8 +72,8 @@ class ArmPoolConfig:
         left_out: types to evaluate zero-shot.
         robots_per_type: training robots of each type (paper: 140). Of an arm from a file: 1 is the arm as it is, more are
             variants of it whose masses and joint dynamics are drawn from `ranges`.
-        heldout_per_type: robots of each type, also of those left out, that are never trained on; of an arm from a file, how many
-            episodes of it an evaluation has.
+        heldout_per_type: robots of each type, also of those left out, that are never trained on. Of an arm from a file:
+            episodes of it in an evaluation.
         seed: seed of the robots' hardware.
         split: `train`, or `new` for robots that no other pool of this seed contains (fine-tuning).
         ranges: where the hardware is drawn from.

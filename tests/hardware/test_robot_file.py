@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from robot_texts import MJCF, arm, joint, link, robot
 
+from hcp_jax.hardware.pool import robots_path
 from hcp_jax.hardware.robot_file import RobotFileError, read_robot, read_robot_here
 
 BOMB = '<?xml version="1.0"?><!DOCTYPE b [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><robot name="&b;"/>'
@@ -106,11 +107,13 @@ def test_what_a_file_leaves_open_is_assumed_and_said(tmp_path):
 
 
 @pytest.mark.slow
-def test_three_hundred_damaged_files_are_read_or_refused_in_one_line(tmp_path):
-    """pytest -m slow tests/hardware/test_robot_file.py (about 3 minutes)"""
-    draw, outcomes = random.Random(0), {"read": 0, "refused": 0}
-    for number in range(300):
-        text = list(draw.choice([arm(3), MJCF, GRIPPER, FORK, arm(7)]))
+@pytest.mark.parametrize("part", range(4))
+def test_three_hundred_damaged_files_are_read_or_refused_in_one_line(part, tmp_path):
+    """pytest -m slow tests/hardware/test_robot_file.py (4 x 75 files, about a minute each)"""
+    real = [(robots_path() / name).read_text() for name in ("catalogue/panda.urdf", "arm_peg.xml")]
+    draw, outcomes = random.Random(part), {"read": 0, "refused": 0}
+    for number in range(75):
+        text = list(draw.choice([arm(3), MJCF, GRIPPER, FORK, arm(7), *real]))
         for _ in range(draw.choice([1, 3, 10, 40])):
             place = draw.randrange(len(text))
             what = draw.random()
@@ -130,7 +133,7 @@ def test_three_hundred_damaged_files_are_read_or_refused_in_one_line(tmp_path):
         assert "\n" not in (message or "")
         assert "without an answer" not in (message or ""), f"{path}: MuJoCo crashed"
         assert "not read within" not in (message or "")
-    assert min(outcomes.values()) > 10, outcomes
+    assert min(outcomes.values()) > 2, outcomes
 
 
 def try_to_read(path) -> str | None:
