@@ -162,7 +162,8 @@ def make_own_pools(config: Config) -> tuple[RobotPool, RobotPool]:
     assert isinstance(pools, ArmPoolConfig)
     robot = load_robot(config.robot, config.robot_base or None, config.robot_tip or None)
     own = make_own_pool(config.task, robot)
-    heldout = own.subset(np.zeros(pools.heldout_per_type, int))
+    count = pools.heldout_per_type
+    heldout = own.subset(np.zeros(count, int)).replace(robot_id=own.robot_id + np.arange(count, dtype=np.int32))
     if pools.robots_per_type == 1:
         return own, heldout
     return make_own_variants(config.task, robot, pools.ranges, pools.robots_per_type, pools.seed), heldout
