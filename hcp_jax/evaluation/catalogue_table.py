@@ -49,8 +49,7 @@ def make_catalogue_table(
     for name in names:
         tuned = None
         if name in runs:
-            record = evaluate_arms(runs[name], trials, episodes_per_trial, physics=physics, own_robots={name: robots[name]})
-            tuned = summarise(record, name)
+            tuned = summarise(evaluate_arms(runs[name], trials, episodes_per_trial, physics=physics), name)
         row = {
             "robot": name,
             "joints": robots[name].chain.num_joints,

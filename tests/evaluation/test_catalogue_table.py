@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hcp_jax import catalogue
-from hcp_jax.config import ArmPoolConfig, Config, ConfigError
+from hcp_jax.config import ArmPoolConfig, Config, ConfigError, to_dict
 from hcp_jax.evaluation.arm_sweeps import evaluate_arms
 from hcp_jax.evaluation.catalogue_table import make_catalogue_table
 from hcp_jax.experiment.arm import make_own_pools
@@ -33,8 +33,6 @@ def panda_run(panda_config, tmp_path_factory):
 def test_fine_tuning_trains_on_the_one_arm_and_evaluates_it(panda_run):
     (row,) = read_rows(panda_run / "metrics.csv")
     assert row["train_types_success"] == row["success_own"]
-    record = evaluate_arms(panda_run, trials=1, robots_per_trial=2)
-    assert {name: values["zero_shot"] for name, values in record["types"].items()} == {"panda": False}
     with pytest.raises(ConfigError, match="--range: not with an arm from a file"):
         evaluate_arms(panda_run, trials=1, robots_per_trial=2, ranges=[("damping", 1.0, 2.0)])
 
@@ -52,6 +50,7 @@ def test_variants_of_an_arm_differ_in_masses_and_joint_dynamics_alone(panda_conf
     np.testing.assert_array_equal(evaluated.hardware["damping"], arm.hardware["damping"].repeat(3, axis=0))
 
 
+@pytest.mark.slow
 def test_the_table_has_each_arm_zero_shot_and_the_fine_tuned_one_beside_it(finished_arms, panda_run, tmp_path, capsys):
     path = tmp_path / "catalogue.json"
     arguments = ["--robots", "ur5e", "panda", "--trials", "2", "--episodes-per-trial", "2", "--json", str(path)]
@@ -65,12 +64,13 @@ def test_the_table_has_each_arm_zero_shot_and_the_fine_tuned_one_beside_it(finis
     assert "median zero-shot success" in capsys.readouterr().out
 
 
-def test_what_no_table_can_be_made_of_is_said(finished_arms, finished_run, panda_run):
+def test_what_no_table_can_be_made_of_is_said(finished_arms, panda_run, tiny_config, tmp_path):
     with pytest.raises(ConfigError, match="--robots=pr2: expected arms out of fetch, gen3"):
         make_catalogue_table(finished_arms, names=["pr2"])
     with pytest.raises(ConfigError, match="not trained on an arm of the catalogue"):
         make_catalogue_table(finished_arms, fine_tuned=[finished_arms])
     with pytest.raises(ConfigError, match="is of panda too"):
         make_catalogue_table(finished_arms, fine_tuned=[panda_run, panda_run])
+    (tmp_path / "config.json").write_text(json.dumps(to_dict(tiny_config)))
     with pytest.raises(ConfigError, match="a policy of hoppers"):
-        make_catalogue_table(finished_run)
+        make_catalogue_table(tmp_path)

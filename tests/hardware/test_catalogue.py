@@ -1,6 +1,7 @@
 """The catalogue's arms against forward kinematics that were published apart from their descriptions, and published weights."""
 
 import dataclasses
+import functools
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 
@@ -159,19 +160,18 @@ PUBLISHED = {
 }  # fmt: skip
 
 
+@functools.cache
 def read(name: str) -> RobotFile:
     return read_robot_here(find_robot(name), None, None)
 
 
-def chain_pose(chain: Chain, angles: np.ndarray) -> np.ndarray:
-    """Of the tip, as policies see it: 4 x 4."""
-    padded = np.zeros(7)
-    padded[: chain.num_joints] = angles
+def chain_poses(chain: Chain, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Position [B, 3] and rotation [B, 3, 3] of the tip at angles [B, n], as policies see it."""
+    padded = np.zeros((len(angles), 7))
+    padded[:, : chain.num_joints] = angles
     turns = quat_to_matrix(jnp.asarray(chain.padded("quat")))
     positions, rotations = joint_poses(jnp.asarray(chain.padded("pos")), turns, jnp.asarray(padded))
-    result = np.eye(4)
-    result[:3, :3], result[:3, 3] = rotations[-1], positions[-1]
-    return result
+    return np.asarray(positions[:, -1]), np.asarray(rotations[:, -1])
 
 
 def test_every_arm_is_compared():
@@ -181,10 +181,11 @@ def test_every_arm_is_compared():
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_the_flange_is_where_the_published_kinematics_put_it(name, rng):
     chain, published = read(name).chain, PUBLISHED[name]
-    for angles in (np.zeros(chain.num_joints), *rng.uniform(-2.0, 2.0, (5, chain.num_joints))):
-        ours, theirs = chain_pose(chain, angles), published.pose(angles)
-        np.testing.assert_allclose(ours[:3, 3], theirs[:3, 3], atol=published.tolerance + 1e-6)  # float32
-        np.testing.assert_allclose(ours[:3, :3], theirs[:3, :3], atol=5e-5)  # pi as 3.1416 in some descriptions
+    angles = np.concatenate([np.zeros((1, chain.num_joints)), rng.uniform(-2.0, 2.0, (5, chain.num_joints))])
+    positions, rotations = chain_poses(chain, angles)
+    theirs = np.stack([published.pose(row) for row in angles])
+    np.testing.assert_allclose(positions, theirs[:, :3, 3], atol=published.tolerance + 1e-6)  # float32
+    np.testing.assert_allclose(rotations, theirs[:, :3, :3], atol=5e-5)  # pi as 3.1416 in some descriptions
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
