@@ -10,7 +10,7 @@ from hcp_jax.hardware.arm import TYPES, sample_hardware
 from hcp_jax.hardware.arm_encodings import encode_arms
 from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES, make_chain_pool
 from hcp_jax.hardware.chain import MAX_JOINTS, Chain
-from hcp_jax.hardware.inverse_kinematics import solve_positions
+from hcp_jax.hardware.inverse_kinematics import NUM_STARTS, solve_positions
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.ranges import ArmRanges
 from hcp_jax.hardware.robot_file import RobotFile, RobotFileError
@@ -18,6 +18,7 @@ from hcp_jax.hardware.start_poses import GRID
 
 OWN_ID = 9_000_000  # above those of every split
 _MAX_ERROR = 0.01  # [m] of a start pose from its point
+_START_SPREADS = (0.1, 0.3, 1.0, np.pi)  # [rad] about 0, of the joints that the search for start poses begins at
 _LEAST_SPREAD = 0.05  # [m], [rad] of an entry that hardly differs among the training arms
 SCALARS = ("torque_limit", "link_mass", "damping", "frictionloss", "armature")
 
@@ -40,24 +41,29 @@ class Entry:
 def make_own_pool(task: str, robot: RobotFile) -> RobotPool:
     """A pool of this one arm, standing where the file puts its base.
 
-    Its start poses are those of the training arms: for the reacher the points of `GRID` that it reaches, for peg insertion all
-    joints at 0, or as near as their ranges allow.
+    Its start poses are those of the training arms: for the reacher the points of `GRID` that it reaches, solved from joints as
+    near to 0 as leads there, for peg insertion all joints at 0, or as near as their ranges allow.
 
     Raises:
         RobotFileError: it reaches no point that the reacher starts from.
     """
-    zero = np.clip(np.zeros(MAX_JOINTS), *robot.chain.padded("joint_range").T)[None]
-    pool = _make_pool(task, [robot.chain], zero)
+    joint_range = robot.chain.padded("joint_range")
+    zero = np.clip(np.zeros(MAX_JOINTS), *joint_range.T)
+    pool = _make_pool(task, [robot.chain], zero[None])
     if task == "peg_insertion":
         return pool
     points = np.asarray(list(itertools.product(*GRID)))
-    repeated = pool.subset(np.zeros(len(points), int))
-    solution = solve_positions(repeated, points, jax.random.key(0))
-    reached = solution.distance < _MAX_ERROR
+    repeated, rng = pool.subset(np.zeros(len(points), int)), np.random.default_rng(0)
+    distance, angles = np.full(len(points), np.inf), np.zeros((len(points), MAX_JOINTS))
+    for spread in _START_SPREADS:
+        starts = zero + spread * rng.uniform(-1.0, 1.0, (len(points), NUM_STARTS, MAX_JOINTS))
+        solution = solve_positions(repeated, points, jax.random.key(0), starts=np.clip(starts, *joint_range.T))
+        better = (distance >= _MAX_ERROR) & (solution.distance < distance)
+        distance[better], angles[better] = solution.distance[better], solution.angles[better]
+    reached = distance < _MAX_ERROR
     if not reached.any():
-        nearest = float(solution.distance.min())
-        raise RobotFileError(f"reaches no point that the reacher starts from; it comes within {nearest:.2f} m of one")
-    return _make_pool(task, [robot.chain], np.asarray(solution.angles[reached], np.float64))
+        raise RobotFileError(f"reaches no point that the reacher starts from; it comes within {distance.min():.2f} m of one")
+    return _make_pool(task, [robot.chain], angles[reached])
 
 
 def make_own_variants(task: str, robot: RobotFile, ranges: ArmRanges, count: int, seed: int) -> RobotPool:

@@ -99,10 +99,14 @@ def test_from_a_base_on_joints_before_it_are_fixed_and_it_stands_at_the_origin(t
 
 def test_what_a_file_leaves_open_is_assumed_and_said(tmp_path):
     open_limit = '<limit lower="-1" upper="1"/>'
-    robot_file = read_robot_here(write(tmp_path, arm(kind="continuous", limit=open_limit)), None, None)
+    text = arm(kind="continuous", limit=open_limit).replace(' damping="0.5"', "", 1)
+    robot_file = read_robot_here(write(tmp_path, text), None, None)
     assert any(note.startswith("continuous joints limited") for note in robot_file.notes)
     assert any(note.startswith("torque limits assumed [N m]: j0 80, j1 80") for note in robot_file.notes)
+    assert "damping assumed [N m s/rad]: j0 1" in robot_file.notes
+    assert "armature assumed [kg m^2]: j0 0.1, j1 0.1" in robot_file.notes
     np.testing.assert_allclose(robot_file.chain.torque_limit, 80.0)
+    np.testing.assert_allclose(robot_file.chain.damping, [1.0, 0.5])
     np.testing.assert_allclose(robot_file.chain.joint_range, [[-np.pi, np.pi]] * 2)
 
 
