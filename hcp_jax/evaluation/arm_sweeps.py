@@ -54,8 +54,8 @@ def evaluate_arms(
         The record that `evaluate --json` writes (DESIGN.md, "The command line"); success in percent, distances in m.
 
     Raises:
-        RunFolderError, CheckpointError, ConfigError, PoolError, RobotFileError: the folder, a type, the pool or an arm cannot be
-            evaluated.
+        RunFolderError, CheckpointError, ConfigError, PoolError, RobotFileError: the folder, a type, the pool or an arm cannot
+            be evaluated.
     """
     config = run_folder.read_config(folder)
     pools, env_config = config.pool, config.env
