@@ -4,7 +4,7 @@ import pathlib
 
 from hcp_jax import command_line
 from hcp_jax.deployment.artefacts import DESCRIPTION_FILE, JAX_FILE, MODEL_FILE, ONNX_FILE, export_policy
-from hcp_jax.robot import add_chain_options
+from hcp_jax.robot import OWN_ARM, add_chain_options
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -13,7 +13,7 @@ def main(arguments: list[str] | None = None) -> None:
     )
     parser.add_argument("run", type=pathlib.Path, help="run folder")
     parser.add_argument(
-        "--robot", required=True, help="H:3 (held-out robot 3 of a type), train:3 (training robot 3), or a URDF or MJCF file"
+        "--robot", required=True, help=f"H:3 (held-out robot 3 of a type), train:3 (training robot 3); or {OWN_ARM}"
     )
     add_chain_options(parser)
     parser.add_argument("--out", type=pathlib.Path, required=True, help="new folder")

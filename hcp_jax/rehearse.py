@@ -9,7 +9,7 @@ from hcp_jax import command_line
 from hcp_jax.config import ConfigError
 from hcp_jax.evaluation.rehearsal import rehearse
 from hcp_jax.evaluation.statistics import write_json
-from hcp_jax.robot import add_chain_options
+from hcp_jax.robot import OWN_ARM, add_chain_options
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -19,7 +19,7 @@ def main(arguments: list[str] | None = None) -> None:
     )
     parser.add_argument("run", type=pathlib.Path, help="run folder")
     parser.add_argument(
-        "--robot", required=True, help="I:3 (held-out robot 3 of a type), train:3 (training robot 3), or a URDF or MJCF file"
+        "--robot", required=True, help=f"I:3 (held-out robot 3 of a type), train:3 (training robot 3); or {OWN_ARM}"
     )
     add_chain_options(parser)
     parser.add_argument("--goals", type=int, default=20)

@@ -4,12 +4,12 @@ import pathlib
 
 from hcp_jax import command_line
 from hcp_jax.config import ConfigError
-from hcp_jax.hardware.robot_file import read_robot
+from hcp_jax.hardware.catalogue import load_robot
 from hcp_jax.physics.base import INTEGRATORS, PHYSICS
 from hcp_jax.rendering.film import MAX_ROBOTS, check_output, write_film
 from hcp_jax.rendering.graphics import choose_backend
 from hcp_jax.rendering.recording import record_episodes
-from hcp_jax.robot import add_chain_options
+from hcp_jax.robot import OWN_ARM, add_chain_options
 from hcp_jax.training.run_folder import read_config
 
 
@@ -21,7 +21,7 @@ def main(arguments: list[str] | None = None) -> None:
         "--robots", nargs="+", metavar="TYPE:ROW", help="held-out robots: H:3, hopper:0 (train:0: a hopper that was trained on)"
     )
     robots.add_argument("--grid", action="store_true", help="the first held-out robot of every type; nine hoppers")
-    robots.add_argument("--robot", type=pathlib.Path, help="your arm, a URDF or MJCF file; see hcp_jax.robot check")
+    robots.add_argument("--robot", help=OWN_ARM)
     add_chain_options(parser)
     parser.add_argument("--out", type=pathlib.Path, required=True, help=".mp4, .gif, or .png for a few pictures in a row")
     parser.add_argument("--pictures", type=int, default=5, help="of each robot in a .png; 1 shows the ends of the episodes")
@@ -39,7 +39,9 @@ def main(arguments: list[str] | None = None) -> None:
             raise ConfigError("--robot: goes with a policy of arms")
         check_output(options.out)
         backend = choose_backend()
-        own = (options.robot.stem, read_robot(options.robot, options.base, options.tip)) if options.robot else None
+        own = None
+        if options.robot:
+            own = (pathlib.Path(options.robot).stem, load_robot(options.robot, options.base, options.tip))
         command_line.enable_compilation_cache()
         recording = record_episodes(options.run, chosen, own, options.physics, options.seed, options.best)
         for name, outcome in zip(recording.names, recording.outcomes, strict=True):

@@ -19,6 +19,7 @@ from hcp_jax.hardware.ranges import ArmRanges
 from hcp_jax.hardware.robot_file import RobotFile
 
 _ROBOTS_PER_TYPE = 140
+OWN_ARM = f"your arm, a URDF or MJCF file (see hcp_jax.robot check), or one of {', '.join(catalogue_names())}"
 
 
 def main(arguments: list[str] | None = None) -> None:

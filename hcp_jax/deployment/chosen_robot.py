@@ -10,9 +10,9 @@ from hcp_jax.experiment.arm import ArmExperiment, make_heldout_arms
 from hcp_jax.experiment.hopper import HopperExperiment, make_heldout_pool
 from hcp_jax.hardware import arm, hopper
 from hcp_jax.hardware.arm_pool import TYPE_STRIDE
+from hcp_jax.hardware.catalogue import load_robot
 from hcp_jax.hardware.own_arm import make_own_pool
 from hcp_jax.hardware.pool import RobotPool
-from hcp_jax.hardware.robot_file import read_robot
 
 _POOLED = re.compile(r"(\w+):(\d+)")
 TRAINED = "train"
@@ -42,9 +42,9 @@ def choose_robot(
 
     Args:
         run: the experiment whose policy it gets.
-        name: `H:3` or `hopper:3`, held-out robot 3 as `evaluate` numbers them; `train:3`, robot 3 of the training pool; or the
-            URDF or MJCF file of an arm.
-        base, tip: links of that file (`hcp_jax.hardware.robot_file.read_robot`).
+        name: `H:3` or `hopper:3`, held-out robot 3 as `evaluate` numbers them; `train:3`, robot 3 of the training pool; or an
+            arm of the catalogue by its name, or its URDF or MJCF file.
+        base, tip: links of that arm (`hcp_jax.hardware.robot_file.read_robot`).
 
     Raises:
         ConfigError: there is no such robot for this run.
@@ -54,7 +54,7 @@ def choose_robot(
     if not match:
         if run.config.task == "hopper":
             raise ConfigError(f"--robot={name}: expected hopper:NUMBER or {TRAINED}:NUMBER")
-        robot = read_robot(pathlib.Path(name), base, tip)
+        robot = load_robot(name, base, tip)
         return ChosenRobot(pathlib.Path(name).stem, make_own_pool(run.config.task, robot), robot.joints)
     kind, number = match[1], int(match[2])
     is_trained = kind == TRAINED
