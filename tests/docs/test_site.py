@@ -83,7 +83,6 @@ def test_a_field_without_text_is_seen(pages):
     assert meanings == {"first": "one | two, and three."}
 
 
-@pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path):
     for name in ("mkdocs", "material", "mkdocstrings"):
         pytest.importorskip(name, reason="the site needs the extra `docs`")
