@@ -1,4 +1,4 @@
-"""`python -m hcp_jax.collect RUNS --out results`: publishes tables, curves, pictures and policies from run folders."""
+"""`python -m hcp_jax.collect RUNS --out results`: adds run folders to the results: policies, tables, curves, pictures."""
 
 import pathlib
 
@@ -11,9 +11,9 @@ from hcp_jax.training.run_folder import read_config
 
 
 def main(arguments: list[str] | None = None) -> None:
-    parser = command_line.OneLineParser(prog="hcp_jax.collect", description="Writes results from run folders.")
+    parser = command_line.OneLineParser(prog="hcp_jax.collect", description="Adds run folders to the results.")
     parser.add_argument("runs", type=pathlib.Path, help="folder of run folders")
-    parser.add_argument("--out", type=pathlib.Path, required=True, help="folder of results; its files are replaced")
+    parser.add_argument("--out", type=pathlib.Path, required=True, help="folder of results, whose tables are made anew")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
         folders = find_runs(options.runs)

@@ -14,16 +14,11 @@ from absl import flags
 from ml_collections import ConfigDict, config_flags
 
 from hcp_jax.config import Config, ConfigError, field_names, from_dict, to_dict, unknown_field
-from hcp_jax.hardware.pool import PoolError
-from hcp_jax.hardware.ranges import RangeError
-from hcp_jax.hardware.robot_file import RobotFileError
+from hcp_jax.errors import UserError
 from hcp_jax.physics.base import PhysicsOverflowError
-from hcp_jax.training.checkpoint import CheckpointError
 from hcp_jax.training.loop import NonFiniteError
-from hcp_jax.training.run_folder import RunFolderError
 
 BAD_INPUT, BROKEN = 2, 1
-_USER_ERRORS = (ConfigError, RangeError, RunFolderError, CheckpointError, PoolError, RobotFileError)
 _OVERRIDE = re.compile(r"--config\.([^=\s]+)(=.*)?$", re.DOTALL)
 
 
@@ -42,7 +37,7 @@ def user_errors_end_the_command() -> Iterator[None]:
     """Bad input ends the process with one line on stderr and exit code 2, what broke on the way with one and exit code 1."""
     try:
         yield
-    except _USER_ERRORS as error:
+    except UserError as error:
         print(_one_line(error), file=sys.stderr)
         sys.exit(BAD_INPUT)
     except (PhysicsOverflowError, NonFiniteError) as error:
@@ -85,7 +80,7 @@ def _run_experiment(path: str, function: str, kind: type):
         result = runpy.run_path(path)[function]()
     except KeyError as error:
         raise ConfigError(f"--config={path}: KeyError: {error} (an experiment file defines {function}())") from error
-    except (ConfigError, RangeError):
+    except UserError:
         raise
     except (Exception, SystemExit) as error:
         raise ConfigError(f"--config={path}: raised {type(error).__name__}: {error}") from error

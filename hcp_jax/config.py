@@ -6,6 +6,7 @@ import math
 import types
 import typing
 
+from hcp_jax.errors import UserError
 from hcp_jax.hardware.arm import OTHER_ARMS, TYPES
 from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS
 from hcp_jax.hardware.encodings import ENCODINGS
@@ -15,12 +16,14 @@ from hcp_jax.physics.base import INTEGRATORS, PHYSICS
 TASKS = ("hopper", "reacher", "peg_insertion")
 ALGORITHM_OF = {"hopper": "ppo", "reacher": "ddpg", "peg_insertion": "ddpg"}
 ARM_CONDITIONINGS = (*ARM_ENCODINGS, "chain_fk", "chain_fk+jacobian", "none+end_effector", "none+goal_offset", "embedding")
+# Those that do not depend on what other arms are trained on (dynamics are scaled by the pool's ranges).
+OWN_ARM_CONDITIONINGS = ("none", "chain", "chain_fk", "chain_fk+jacobian", "none+end_effector", "none+goal_offset")
 INIT_LAYERS = ("hidden", "all")
 RELABEL_STRATEGIES = ("future", "final", "none")
 NETWORKS = ("flat", "joints")
 
 
-class ConfigError(ValueError):
+class ConfigError(UserError):
     """A setting is unknown, of the wrong type or outside what is allowed. The message names field, value and bounds."""
 
 
@@ -66,10 +69,12 @@ class ArmPoolConfig:
     """The arms. A pool depends on this record alone, never on the training seed.
 
     Attributes:
-        types: robot types to train on (hcp_jax.hardware.arm).
+        types: robot types to train on (hcp_jax.hardware.arm); none where `robot` names an arm.
         left_out: types to evaluate zero-shot.
-        robots_per_type: training robots of each type (paper: 140).
-        heldout_per_type: robots of each type, also of those left out, that are never trained on.
+        robots_per_type: training robots of each type (paper: 140). Of an arm from a file: 1 is the arm as it is, more are
+            variants of it whose masses and joint dynamics are drawn from `ranges`.
+        heldout_per_type: robots of each type, also of those left out, that are never trained on. Of an arm from a file:
+            episodes of it in an evaluation.
         seed: seed of the robots' hardware.
         split: `train`, or `new` for robots that no other pool of this seed contains (fine-tuning).
         ranges: where the hardware is drawn from.
@@ -84,9 +89,8 @@ class ArmPoolConfig:
     ranges: ArmRanges = ArmRanges()
 
     def __post_init__(self):
-        for field, least in (("types", 1), ("left_out", 0)):
+        for field in ("types", "left_out"):
             value = getattr(self, field)
-            _require(len(value) >= least, f"pool.{field}", value, f"at least {least} types")
             for name in value:
                 _require(name in TYPES, f"pool.{field}", name, f"types out of {', '.join(TYPES)}")
             _require(len(set(value)) == len(value), f"pool.{field}", value, "no type twice")
@@ -96,11 +100,11 @@ class ArmPoolConfig:
 
     @property
     def num_robots(self) -> int:
-        return len(self.types) * self.robots_per_type
+        return max(1, len(self.types)) * self.robots_per_type
 
     @property
     def num_heldout(self) -> int:
-        return len({*self.types, *self.left_out}) * self.heldout_per_type
+        return max(1, len({*self.types, *self.left_out})) * self.heldout_per_type
 
 
 @dataclasses.dataclass(frozen=True)
@@ -347,6 +351,8 @@ class Config:
         max_skipped_updates: updates in a row whose loss or gradient is not finite, and which are skipped, that end the run.
         init: run folder whose layers and observation statistics this run starts from; empty starts from scratch.
         init_layers: `hidden` (paper, section 5.2) or `all` of that run's layers.
+        robot: one arm to train on instead of types: a URDF or MJCF file, or a name of `robots/catalogue/`.
+        robot_base, robot_tip: links that it starts and ends at, where that is not plain (`hcp_jax.robot check --base --tip`).
     """
 
     name: str
@@ -363,6 +369,9 @@ class Config:
     max_skipped_updates: int = 100
     init: str = ""
     init_layers: str = "hidden"
+    robot: str = ""
+    robot_base: str = ""
+    robot_tip: str = ""
     pool: PoolConfig | ArmPoolConfig = PoolConfig()
     env: HopperConfig | ArmConfig = HopperConfig()
     ppo: PPOConfig = PPOConfig()
@@ -386,6 +395,9 @@ class Config:
         kinds = (PoolConfig, HopperConfig) if self.task == "hopper" else (ArmPoolConfig, ArmConfig)
         for field, kind in zip(("pool", "env"), kinds, strict=True):
             _require(isinstance(getattr(self, field), kind), field, getattr(self, field), f"{kind.__name__} for {self.task}")
+        _require(not self.robot or self.task != "hopper", "robot", self.robot, "none for the hopper")
+        if isinstance(self.pool, ArmPoolConfig):
+            self._check_robot(self.pool)
         if isinstance(self.pool, ArmPoolConfig) and self.task == "reacher":
             for name in (*self.pool.types, *self.pool.left_out):
                 _require(name not in OTHER_ARMS, "pool.types", name, "types A to I for the reacher (J and K hold a peg)")
@@ -395,6 +407,16 @@ class Config:
             self._check_minibatches()
         else:
             self._check_buffer()
+
+    def _check_robot(self, pool: ArmPoolConfig) -> None:
+        if not self.robot:
+            _require(len(pool.types) >= 1, "pool.types", pool.types, "at least 1 type, or an arm's file in robot")
+            return
+        _require(not pool.types, "pool.types", pool.types, f"() beside robot={self.robot!r}")
+        _require(not pool.left_out, "pool.left_out", pool.left_out, f"() beside robot={self.robot!r}")
+        _require(
+            self.encoding in OWN_ARM_CONDITIONINGS, "encoding", self.encoding, f"one of {', '.join(OWN_ARM_CONDITIONINGS)}"
+        )
 
     def _check_minibatches(self) -> None:
         batch = self.batch_size

@@ -12,9 +12,9 @@ from hcp_jax.evaluation.hopper_sweeps import evaluate_hoppers
 from hcp_jax.evaluation.new_robots import RangeChange
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.hardware.arm import TYPES
-from hcp_jax.hardware.robot_file import read_robot
+from hcp_jax.hardware.catalogue import load_robot
 from hcp_jax.physics.base import INTEGRATORS, PHYSICS
-from hcp_jax.robot import add_chain_options
+from hcp_jax.robot import OWN_ARM, add_chain_options
 from hcp_jax.training.run_folder import read_config
 
 
@@ -35,7 +35,7 @@ def main(arguments: list[str] | None = None) -> None:
         help="draw the new robots' hardware from another range than in training: --range damping 30 40",
     )
     parser.add_argument("--pool", type=pathlib.Path, help="take the new robots from a folder that RobotPool.save wrote")
-    parser.add_argument("--robot", type=pathlib.Path, help="your arm, a URDF or MJCF file; see hcp_jax.robot check")
+    parser.add_argument("--robot", help=OWN_ARM)
     add_chain_options(parser)
     parser.add_argument("--seed", type=int, default=0, help="seed of the initial states")
     parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
@@ -62,7 +62,8 @@ def main(arguments: list[str] | None = None) -> None:
             record = evaluate_hoppers(options.run, fit_steps=options.fit_steps, **settings)
         else:
             if options.robot:
-                settings["own_robot"] = (options.robot.stem, read_robot(options.robot, options.base, options.tip))
+                robot = load_robot(options.robot, options.base, options.tip)
+                settings["own_robots"] = {pathlib.Path(options.robot).stem: robot}
             record = evaluate_arms(options.run, types=options.types or (), **settings)
     print_table(record)
     if options.json:

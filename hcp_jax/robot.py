@@ -12,12 +12,14 @@ from hcp_jax import command_line, presets
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.hardware.arm_encodings import encode_arms
 from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES, make_arm_pool
+from hcp_jax.hardware.catalogue import catalogue_names, load_robot
 from hcp_jax.hardware.own_arm import compare_with, find_nearest, make_own_pool
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.ranges import ArmRanges
-from hcp_jax.hardware.robot_file import RobotFile, read_robot
+from hcp_jax.hardware.robot_file import RobotFile
 
 _ROBOTS_PER_TYPE = 140
+OWN_ARM = f"your arm, a URDF or MJCF file (see hcp_jax.robot check), or one of {', '.join(catalogue_names())}"
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -27,13 +29,13 @@ def main(arguments: list[str] | None = None) -> None:
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     parser.add_argument("action", choices=["check"])
-    parser.add_argument("file", type=pathlib.Path, help="URDF or MJCF; meshes may be missing")
+    parser.add_argument("file", help=f"URDF or MJCF, meshes may be missing; or one of {', '.join(catalogue_names())}")
     add_chain_options(parser)
     parser.add_argument("--task", choices=list(CHAIN_TEMPLATES), default="reacher", help="whose training arms to compare with")
     parser.add_argument("--json", type=pathlib.Path, help="file to write all of it to")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
-        robot = read_robot(options.file, options.base, options.tip)
+        robot = load_robot(options.file, options.base, options.tip)
         own = make_own_pool(options.task, robot)
         trained = make_arm_pool(options.task, ArmRanges(), presets.ARM_TYPES, _ROBOTS_PER_TYPE, seed=0)
         record = describe(robot, own, trained)

@@ -13,6 +13,7 @@ from hcp_jax.config import Config, ConfigError, field_names, from_dict, to_dict
 EXPERIMENTS = pathlib.Path(__file__).resolve().parents[1] / "experiments"
 HOPPER = str(EXPERIMENTS / "hopper_ppo.py")
 REACHER = str(EXPERIMENTS / "reacher_hcpe_leave_h.py")
+FINETUNE = str(EXPERIMENTS / "finetune.py")
 
 
 @pytest.mark.parametrize("path", sorted(EXPERIMENTS.glob("*.py")), ids=lambda path: path.stem)
@@ -84,6 +85,20 @@ BAD_ARGUMENTS = {
         "encoding='kinematics': expected one of none",
     ),
     "algorithm of another task": (["--config", REACHER, "--config.algorithm=ppo"], "algorithm='ppo': expected one of ddpg"),
+    "neither types nor an arm": (
+        ["--config", REACHER, "--config.pool.types=()"],
+        "pool.types=(): expected at least 1 type, or",
+    ),
+    "types beside an arm": (["--config", REACHER, "--config.robot=panda"], "expected () beside robot='panda'"),
+    "an arm for the hopper": (["--config", HOPPER, "--config.robot=panda"], "robot='panda': expected none for the hopper"),
+    "an arm that is not there": (
+        ["--config", FINETUNE, "--config.robot=pandas", "--config.init="],
+        "pandas: no such file, and no arm of the catalogue: fetch, gen3, iiwa14, panda, sawyer, ur10e, ur5e, xarm7",
+    ),
+    "dynamics of one arm alone": (
+        ["--config", FINETUNE, "--config.encoding=chain+dynamics"],
+        "encoding='chain+dynamics': expected one of none, chain,",
+    ),
     "missing init": (["--config", HOPPER, "--config.init=nowhere"], "nowhere: no such run folder"),
     "resume of nothing": (["--config", HOPPER, "--resume"], "no such run folder"),
 }

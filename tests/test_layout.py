@@ -6,6 +6,7 @@ import pathlib
 PACKAGE = pathlib.Path(__file__).resolve().parents[1] / "hcp_jax"
 # From the ground up (docs: DESIGN). A module may import from its own layer and those before it.
 LAYERS = [
+    "errors",
     "devices",
     "hardware",
     "physics",
@@ -17,7 +18,10 @@ LAYERS = [
     "experiment",
     "gym",
     "training",
+    "deployment",
     "evaluation",
+    "reporting",
+    "rendering",
 ]
 
 

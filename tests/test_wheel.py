@@ -42,7 +42,7 @@ def test_an_installed_wheel_trains_for_one_iteration_outside_the_checkout(instal
     assert result.returncode == 0, result.stderr
     assert (tmp_path / "runs" / "tiny" / "metrics.csv").read_text().count("\n") == 2
     where = subprocess.run(
-        [installed_python, "-c", "import hcp_jax; print(hcp_jax.__file__)"],
+        [installed_python, "-c", "from hcp_jax.hardware import catalogue as c; print(c.find_robot('panda'))"],
         cwd=tmp_path,
         capture_output=True,
         text=True,

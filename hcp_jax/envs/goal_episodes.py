@@ -7,8 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from hcp_jax.envs.goal import GoalEnv
-from hcp_jax.physics.base import PhysicsOverflowError
+from hcp_jax.envs.episodes import stack_states, without_overflow
+from hcp_jax.envs.goal import GoalEnv, GoalState, GoalTransition
+from hcp_jax.physics.base import PhysicsState
 
 # (params, index [B], obs [B, O], goal [B, G]) -> action [B, A]
 GoalPolicyFn = Callable[..., jax.Array]
@@ -38,7 +39,7 @@ class GoalEvaluator:
 
     def __init__(self, env: GoalEnv, policy: GoalPolicyFn):
         self.env, self._policy = env, policy
-        self._play = jax.jit(self._play_episodes)
+        self._play, self._start, self._step = map(jax.jit, (self._play_episodes, self._start_episodes, self._play_step))
 
     def __call__(self, params, index: np.ndarray, key: jax.Array) -> GoalEpisodes:
         """Plays one episode of the robots at positions `index` [B].
@@ -46,12 +47,27 @@ class GoalEvaluator:
         Raises:
             PhysicsOverflowError: the physics dropped contacts or constraints.
         """
-        episodes = jax.device_get(self._play(params, jnp.asarray(index, jnp.int32), key))
-        if episodes.overflow:
-            raise PhysicsOverflowError(int(episodes.overflow))
-        return episodes
+        return without_overflow(self._play(params, jnp.asarray(index, jnp.int32), key))
+
+    def record(self, params, index: np.ndarray, key: jax.Array) -> tuple[GoalEpisodes, PhysicsState]:
+        """The same episodes, and the states that they go through: [T + 1, B, ...], of a robot until its episode's end."""
+        carry = self._start(jnp.asarray(index, jnp.int32), key)
+        states = [carry[0].physics]
+        while self._is_going_on(carry):
+            carry = self._step(params, carry)
+            states.append(carry[0].physics)
+        return without_overflow(carry[1]), stack_states(states)
+
+    def step(self, params, state: GoalState) -> tuple[GoalState, GoalTransition]:
+        """One control step of every world under the policy."""
+        return self.env.step(state, self._policy(params, state.index, state.obs, state.desired_goal))
 
     def _play_episodes(self, params, index, key) -> GoalEpisodes:
+        carry = self._start_episodes(index, key)
+        return jax.lax.while_loop(self._is_going_on, lambda carry: self._play_step(params, carry), carry)[1]
+
+    def _start_episodes(self, index, key):
+        """State of the worlds, the episodes so far, and the number of steps."""
         state = self.env.reset(key, index)
         episodes = GoalEpisodes(
             index=index,
@@ -62,23 +78,21 @@ class GoalEvaluator:
             diverged=jnp.zeros(index.shape, bool),
             overflow=jnp.int32(0),
         )
+        return state, episodes, jnp.int32(0)
 
-        def is_going_on(carry):
-            _, episodes, step = carry
-            return (step < self.env.episode_length) & ~jnp.all(episodes.success | episodes.diverged)
+    def _is_going_on(self, carry):
+        _, episodes, step = carry
+        return (step < self.env.episode_length) & ~jnp.all(episodes.success | episodes.diverged)
 
-        def play(carry):
-            state, episodes, step = carry
-            alive = ~(episodes.success | episodes.diverged)
-            action = self._policy(params, index, state.obs, state.desired_goal)
-            state, transition = self.env.step(state, action)
-            episodes = episodes.replace(
-                success=episodes.success | (alive & transition.success & ~transition.diverged),
-                final_distance=jnp.where(alive, transition.distance, episodes.final_distance),
-                episode_length=episodes.episode_length + alive,
-                diverged=episodes.diverged | (alive & transition.diverged),
-                overflow=episodes.overflow + transition.overflow,
-            )
-            return state, episodes, step + 1
-
-        return jax.lax.while_loop(is_going_on, play, (state, episodes, jnp.int32(0)))[1]
+    def _play_step(self, params, carry):
+        state, episodes, step = carry
+        alive = ~(episodes.success | episodes.diverged)
+        state, transition = self.step(params, state)
+        episodes = episodes.replace(
+            success=episodes.success | (alive & transition.success & ~transition.diverged),
+            final_distance=jnp.where(alive, transition.distance, episodes.final_distance),
+            episode_length=episodes.episode_length + alive,
+            diverged=episodes.diverged | (alive & transition.diverged),
+            overflow=episodes.overflow + transition.overflow,
+        )
+        return state, episodes, step + 1

@@ -3,6 +3,7 @@
 import pathlib
 from collections.abc import Sequence
 
+from hcp_jax.evaluation.appendix import make_appendix
 from hcp_jax.evaluation.publishing import group_by_name, plot_groups, publish_runs
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.summary import SUCCESSES, summarise_runs
@@ -11,19 +12,22 @@ from hcp_jax.training.run_folder import read_config
 
 
 def collect_arms(folders: Sequence[pathlib.Path], results: pathlib.Path) -> list[str]:
-    """Writes into `results` from the arms' run folders; returns a line for each thing written.
+    """Adds the arms' run folders to `results`; returns a line for each thing written.
 
-    `arms/summary.json` (a row per experiment), `arms/TASK.png` (curves of each task's experiments), each run's metrics under
-    `arms/runs/` and its policy under `policies/`; and `table1.json`, of the policies whose evaluations are there.
+    Each run's metrics under `arms/runs/` and its policy under `policies/`; from all runs there, `arms/summary.json` (a row per
+    experiment) and `arms/TASK.png` (curves of each task's experiments); and `table1.json` and `appendix.json`, of the policies
+    whose evaluations are there.
     """
     out = results / "arms"
-    written = [publish_runs(folders, out, results / "policies")]
-    write_json(out / "summary.json", summarise_runs(folders))
-    for task in dict.fromkeys(read_config(folder).task for folder in folders):
-        groups = group_by_name([folder for folder in folders if read_config(folder).task == task])
+    published = publish_runs(folders, out, results / "policies")
+    write_json(out / "summary.json", summarise_runs(published))
+    for task in dict.fromkeys(read_config(folder).task for folder in published):
+        groups = group_by_name([folder for folder in published if read_config(folder).task == task])
         plot_groups(groups, out / f"{task}.png", SUCCESSES, "success [%] on held-out robots")
-    rows = make_table1(results)
-    write_json(results / "table1.json", rows)
-    written.append(f"{results}/table1.json: {len(rows)} rows")
-    written.append(f"{out}/summary.json: {', '.join(group_by_name(folders))}")
+    written = [f"{out}/runs, {results}/policies: {', '.join(folder.name for folder in folders)}"]
+    for name, make_rows in (("table1", make_table1), ("appendix", make_appendix)):
+        rows = make_rows(results)
+        write_json(results / f"{name}.json", rows)
+        written.append(f"{results}/{name}.json: {len(rows)} rows")
+    written.append(f"{out}/summary.json: {', '.join(group_by_name(published))}")
     return written

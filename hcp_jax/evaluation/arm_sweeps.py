@@ -1,7 +1,7 @@
 """Evaluation of an arm run: success on new robots of each type, with what kept the others from it."""
 
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import jax
 import numpy as np
@@ -9,8 +9,10 @@ import numpy as np
 from hcp_jax.config import ArmConfig, ArmPoolConfig, ConfigError
 from hcp_jax.envs.goal_episodes import GoalEpisodes
 from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, load_pool
+from hcp_jax.evaluation.records import QUANTILES
 from hcp_jax.experiment.arm import make_arm_experiment, make_evaluator, make_heldout_arms
-from hcp_jax.hardware.arm import OTHER_ARMS, TYPES
+from hcp_jax.hardware.arm import OTHER_ARMS, TYPES, type_name
+from hcp_jax.hardware.catalogue import load_robot
 from hcp_jax.hardware.inverse_kinematics import is_reachable
 from hcp_jax.hardware.own_arm import make_own_pool
 from hcp_jax.hardware.pool import RobotPool
@@ -18,8 +20,6 @@ from hcp_jax.hardware.robot_file import RobotFile
 from hcp_jax.physics.base import default_physics
 from hcp_jax.training import run_folder
 from hcp_jax.training.warm_start import load_policy
-
-QUANTILES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 
 def evaluate_arms(
@@ -32,7 +32,7 @@ def evaluate_arms(
     best: bool = False,
     ranges: Sequence[RangeChange] = (),
     pool_folder: pathlib.Path | None = None,
-    own_robot: tuple[str, RobotFile] | None = None,
+    own_robots: Mapping[str, RobotFile] | None = None,
 ) -> dict:
     """Evaluates the newest checkpoint of a run folder, or its best one, on held-out robots 0..trials*robots_per_trial-1 of each
     type, one episode each; or on those of a saved pool, in order, all of a type before any twice.
@@ -46,19 +46,26 @@ def evaluate_arms(
         best: take the checkpoint with the highest success on held-out robots of the training types.
         ranges: ranges that the new robots are drawn from, where others than in training.
         pool_folder: a saved pool to take the robots from.
-        own_robot: one arm with its name, of which all robots are copies.
+        own_robots: arms from files, by name, instead of types; all robots of a name are copies of that arm. By default the one
+            that the run was trained on, if there is one.
 
     Returns:
         The record that `evaluate --json` writes (DESIGN.md, "The command line"); success in percent, distances in m.
 
     Raises:
-        RunFolderError, CheckpointError, ConfigError, PoolError: the folder, a type or the pool cannot be evaluated.
+        RunFolderError, CheckpointError, ConfigError, PoolError, RobotFileError: the folder, a type, the pool or an arm cannot
+            be evaluated.
     """
     config = run_folder.read_config(folder)
     pools, env_config = config.pool, config.env
     assert isinstance(pools, ArmPoolConfig)
     assert isinstance(env_config, ArmConfig)
-    if not types and not pool_folder and not own_robot:
+    own_name = pathlib.Path(config.robot).stem
+    if config.robot and not types and not pool_folder and not own_robots:
+        own_robots = {own_name: load_robot(config.robot, config.robot_base or None, config.robot_tip or None)}
+    if own_robots and ranges:
+        raise ConfigError("--range: not with an arm from a file, which is as it is")
+    if not types and not pool_folder and not own_robots:
         types = tuple(dict.fromkeys((*pools.types, *pools.left_out)))
     for name in types:
         if config.task == "reacher" and name in OTHER_ARMS:
@@ -67,8 +74,8 @@ def evaluate_arms(
     run = make_arm_experiment(config, default_physics() if physics == "auto" else physics)
     iteration, state = load_policy(folder, run, best)
     count, upright = trials * robots_per_trial, config.task == "peg_insertion"
-    if own_robot:
-        pools_by_type = {own_robot[0]: make_own_pool(config.task, own_robot[1])}
+    if own_robots:
+        pools_by_type = {name: make_own_pool(config.task, robot) for name, robot in own_robots.items()}
     elif pool_folder:
         pools_by_type = split_types(load_pool(pool_folder, run.train_pool), types)
     else:
@@ -99,14 +106,15 @@ def evaluate_arms(
         goals = np.asarray(episodes.desired_goal)
         reachable = is_reachable(pool.subset(index), goals, env_config.success_distance, key_goal, upright)
         stuck = immovable_joints(pool)[index].any(axis=1)
-        record["types"][name] = {"zero_shot": name not in pools.types} | summarise_type(episodes, reachable, stuck, trials)
+        zero_shot = name not in pools.types and name != own_name
+        record["types"][name] = {"zero_shot": zero_shot} | summarise_type(episodes, reachable, stuck, trials)
         record["robots"] += [{"type": name} | row for row in robot_rows(pool, episodes, reachable)]
     return record
 
 
 def split_types(pool: RobotPool, types: Sequence[str]) -> dict[str, RobotPool]:
     """The robots of each of `types` in a pool that contains them all, or of each type that it contains."""
-    names = np.asarray([TYPES[int(number)] for number in pool.hardware["type"][:, 0]])
+    names = np.asarray([type_name(number) for number in pool.hardware["type"][:, 0]])
     for name in types:
         if name not in names:
             raise ConfigError(f"--types={name}: the pool has robots of type {', '.join(dict.fromkeys(names))}")
@@ -114,7 +122,8 @@ def split_types(pool: RobotPool, types: Sequence[str]) -> dict[str, RobotPool]:
 
 
 def summarise_type(episodes: GoalEpisodes, reachable: np.ndarray, stuck: np.ndarray, trials: int) -> dict:
-    """Success over trials, over the goals that the arm can reach at all, and over the arms that can move all their joints."""
+    """Success over trials, over the goals that the arm can reach at all, and over the arms that can move all their joints;
+    final distance [m] and length of each episode, for distributions."""
 
     def percent(chosen: np.ndarray) -> float | None:
         return 100.0 * float(episodes.success[chosen].mean()) if chosen.any() else None
@@ -129,6 +138,8 @@ def summarise_type(episodes: GoalEpisodes, reachable: np.ndarray, stuck: np.ndar
         "immovable_share": 100.0 * float(stuck.mean()),
         "final_distance_quantiles": {f"{q:g}": float(np.quantile(episodes.final_distance, q)) for q in QUANTILES},
         "episode_length_mean": float(episodes.episode_length.mean()),
+        "final_distances": np.round(np.asarray(episodes.final_distance, np.float64), 4).tolist(),
+        "episode_lengths": np.asarray(episodes.episode_length).tolist(),
     }
 
 

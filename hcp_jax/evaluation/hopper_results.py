@@ -17,16 +17,17 @@ LABEL = "return of one episode"
 
 
 def collect_hoppers(folders: Sequence[pathlib.Path], results: pathlib.Path) -> list[str]:
-    """Writes into `results` from the hopper's run folders; returns a line for each thing written.
+    """Adds the hopper's run folders to `results`; returns a line for each thing written.
 
-    `hopper/summary.json` (a row per algorithm), `hopper/curves.png`, each run's metrics under `hopper/runs/` and its policy
-    under `policies/`, `hopper/finetune.json` and `.png` if there are runs of 100 new hoppers, `hopper/embedding.json` and
-    `.png` if there is a `hopper_embedding` run.
+    Each run's metrics under `hopper/runs/` and its policy under `policies/`; from all runs there, `hopper/summary.json` (a row
+    per algorithm), `hopper/curves.png`, and `hopper/finetune.json` and `.png` if there are runs of 100 new hoppers. If a run of
+    `hopper_embedding` is added, `hopper/embedding.json` and `.png`.
     """
     out = results / "hopper"
-    written = [publish_runs(folders, out, results / "policies")]
-    by_name = group_by_name(folders)
-    new_robots = [folder for folder in folders if read_config(folder).pool.split == "new"]
+    published = publish_runs(folders, out, results / "policies")
+    written = [f"{out}/runs, {results}/policies: {', '.join(folder.name for folder in folders)}"]
+    by_name = group_by_name(published)
+    new_robots = [folder for folder in published if read_config(folder).pool.split == "new"]
     main = {name: group for name, group in by_name.items() if name != "hopper_embedding" and group[0] not in new_robots}
     if main:
         write_json(out / "summary.json", summarise_runs([folder for group in main.values() for folder in group]))
@@ -34,8 +35,8 @@ def collect_hoppers(folders: Sequence[pathlib.Path], results: pathlib.Path) -> l
         written.append(f"{out}/summary.json, {out}/curves.png: {', '.join(main)}")
     if new_robots:
         written.append(write_finetune(new_robots, out))
-    if "hopper_embedding" in by_name:
-        written.append(write_embedding(by_name["hopper_embedding"][0], out))
+    for folder in group_by_name(folders).get("hopper_embedding", ())[:1]:
+        written.append(write_embedding(folder, out))
     return written
 
 
@@ -71,7 +72,7 @@ def write_finetune(folders: Sequence[pathlib.Path], out: pathlib.Path) -> str:
 
 
 def write_embedding(folder: pathlib.Path, out: pathlib.Path) -> str:
-    """R^2 of the torso mass from the 2-D embedding, and its scatter plot."""
+    """R^2 of the torso mass [kg] from the 2-D embedding, both for each hopper, and their scatter plot."""
     run = make_experiment(read_config(folder))
     iteration, state = load_policy(folder, run)
     embedding, mass = np.asarray(state.params["embedding"]), run.train_pool.hardware["body_mass"][:, 0]
@@ -81,6 +82,8 @@ def write_embedding(folder: pathlib.Path, out: pathlib.Path) -> str:
         "neighbours": 5,
         "folds": 5,
         "r2": round(knn_r2(embedding, mass), 4),
+        "embedding": np.round(embedding.astype(np.float64), 4).tolist(),
+        "torso_mass": np.round(mass, 4).tolist(),
         "commit": read_run_commit(folder),
     }
     write_json(out / "embedding.json", record)

@@ -8,7 +8,7 @@ import numpy as np
 
 from hcp_jax.algorithms.ppo import PPOState
 from hcp_jax.config import PoolConfig
-from hcp_jax.envs.episodes import Episodes, Evaluator
+from hcp_jax.envs.episodes import Episodes
 from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, load_pool
 from hcp_jax.evaluation.statistics import robot_rows, summarise_trials
 from hcp_jax.experiment.build import make_experiment
@@ -16,6 +16,7 @@ from hcp_jax.experiment.hopper import (
     EmbeddingFitter,
     HopperExperiment,
     heldout_v_h,
+    make_evaluator,
     make_heldout_pool,
     train_v_h,
 )
@@ -104,12 +105,7 @@ def play_trials(
     run: HopperExperiment, state: PPOState, pool: RobotPool, rows: np.ndarray, v_h: jax.Array, trials: int, key: jax.Array
 ) -> list[Episodes]:
     """One episode of each of `rows`, all in one jitted call, split into `trials` equal parts."""
-
-    def policy(params, obs, v_h):
-        network, statistics = params
-        return run.ppo.mean_action(network, statistics, obs, v_h)
-
     params = (state.params["network"], state.obs_statistics)
-    episodes = Evaluator(run.make_env(pool), policy)(params, run.ppo.visible(state, v_h), rows, key)
+    episodes = make_evaluator(run.ppo, run.make_env(pool))(params, run.ppo.visible(state, v_h), rows, key)
     parts = np.split(np.arange(len(rows)), trials)
     return [episodes.take(part) for part in parts]

@@ -4,10 +4,9 @@ import pathlib
 import shutil
 from collections.abc import Mapping, Sequence
 
-import numpy as np
 from matplotlib.figure import Figure
 
-from hcp_jax.evaluation.summary import read_curve
+from hcp_jax.evaluation.summary import average_curves, read_curve
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE
 from hcp_jax.training.policy_file import write_policy
@@ -20,12 +19,16 @@ def find_runs(runs: pathlib.Path) -> list[pathlib.Path]:
     return sorted(path.parent for path in runs.glob(f"*/{CONFIG_FILE}") if (path.parent / METRICS_FILE).exists())
 
 
-def publish_runs(folders: Sequence[pathlib.Path], out: pathlib.Path, policies: pathlib.Path) -> str:
-    """Copies each run's metrics to `out/runs` and writes its policy to `policies`."""
+def publish_runs(folders: Sequence[pathlib.Path], out: pathlib.Path, policies: pathlib.Path) -> list[pathlib.Path]:
+    """Copies each run's metrics to `out/runs` and writes its policy to `policies`.
+
+    Returns:
+        all folders of `out/runs`, those of earlier calls too: what tables and curves are made of.
+    """
     for folder in folders:
         copy_files(folder, out / "runs" / folder.name, (CONFIG_FILE, ENVIRONMENT_FILE, METRICS_FILE, TIMING_FILE))
         publish_policy(folder, policies / folder.name)
-    return f"{out}/runs, {policies}: {', '.join(folder.name for folder in folders)}"
+    return find_runs(out / "runs")
 
 
 def group_by_name(folders: Sequence[pathlib.Path]) -> dict[str, list[pathlib.Path]]:
@@ -54,13 +57,11 @@ def plot_groups(groups: Mapping[str, Sequence[pathlib.Path]], path: pathlib.Path
     panels = figure.subplots(1, len(columns), sharey=True, squeeze=False)[0]
     for column, axes in zip(columns, panels, strict=True):
         for name, folders in groups.items():
-            curves = [read_curve(folder, column) for folder in folders]
-            length = min(len(curve) for curve in curves)
-            if not length:
+            curve = average_curves([read_curve(folder, column) for folder in folders])
+            if curve is None:
                 continue  # an experiment without this column
-            steps, values = curves[0][:length, 0] / 1e6, np.stack([curve[:length, 1] for curve in curves])
-            axes.plot(steps, values.mean(axis=0), label=f"{name} ({len(folders)} seeds)")
-            axes.fill_between(steps, values.min(axis=0), values.max(axis=0), alpha=0.2)
+            axes.plot(curve.steps / 1e6, curve.mean, label=f"{name} ({curve.num_seeds} seeds)")
+            axes.fill_between(curve.steps / 1e6, curve.low, curve.high, alpha=0.2)
         axes.set_title(column.replace("_", " "))
         axes.set_xlabel("control steps [million]")
         axes.grid(alpha=0.3)

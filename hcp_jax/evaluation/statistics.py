@@ -2,12 +2,16 @@
 
 import json
 import pathlib
+import re
 from collections.abc import Sequence
 
 import numpy as np
 
 from hcp_jax.envs.episodes import Episodes
 from hcp_jax.hardware.pool import RobotPool
+
+# A list of numbers that json.dumps spreads over lines. Texts hold no line breaks in JSON, so it is no part of one.
+_NUMBERS = re.compile(r"\[\n([-+\d.eE,\s]+)\]")
 
 
 def summarise_trials(trials: Sequence[Episodes]) -> dict[str, float]:
@@ -39,6 +43,7 @@ def robot_rows(pool: RobotPool, trials: Sequence[Episodes]) -> list[dict]:
 
 
 def write_json(path: pathlib.Path, record: dict | list) -> None:
-    """Writes one record, indented, with numbers that JSON has."""
+    """Writes one record, indented, lists of numbers on one line, with numbers that JSON has."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
+    text = json.dumps(record, indent=1, allow_nan=False)
+    path.write_text(_NUMBERS.sub(lambda match: "[" + " ".join(match[1].split()) + "]", text) + "\n")

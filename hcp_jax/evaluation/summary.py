@@ -1,6 +1,7 @@
 """One row per algorithm from run folders: what `results/*/summary.json` holds."""
 
 import collections
+import dataclasses
 import json
 import pathlib
 from collections.abc import Sequence
@@ -85,6 +86,26 @@ def read_curve(folder: pathlib.Path, column: str) -> np.ndarray:
     rows = read_rows(folder / METRICS_FILE)
     points = [(int(row["env_steps"]), float(row[column])) for row in rows if row.get(column)]
     return np.asarray(points).reshape(-1, 2)
+
+
+@dataclasses.dataclass(frozen=True)
+class SeedCurve:
+    """A curve over seeds: control steps, mean, lowest and highest value of each evaluation, [E] each."""
+
+    steps: np.ndarray
+    mean: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    num_seeds: int
+
+
+def average_curves(curves: Sequence[np.ndarray]) -> SeedCurve | None:
+    """Curves of several seeds [E, 2] as one, as far as all of them go; None if one of them has no point."""
+    length = min(len(curve) for curve in curves)
+    if not length:
+        return None
+    values = np.stack([curve[:length, 1] for curve in curves])
+    return SeedCurve(curves[0][:length, 0], values.mean(axis=0), values.min(axis=0), values.max(axis=0), len(curves))
 
 
 def steps_to_reach(folder: pathlib.Path, column: str, value: float) -> int | None:

@@ -24,6 +24,9 @@ PAPER = {
 }
 
 
+Runs = Sequence[tuple[str, dict, Config]]  # of one experiment: policy, record and config of each seed
+
+
 def make_table1(results: pathlib.Path) -> list[dict]:
     """One row for each experiment, sorted by the paper's number.
 
@@ -32,11 +35,18 @@ def make_table1(results: pathlib.Path) -> list[dict]:
             --json` writes them.
 
     Returns:
-        rows of experiment, task, train_types, test_type, algorithm, encoding, network, seeds, success_mean,
-        success_std_over_trials (mean over seeds), success_std_over_seeds, reachable_success_mean, control_steps, wall_seconds,
-        paper_mean and paper_std (of HCP-E for every v_h, of DDPG+HER for none, None for controls), policy (names), commit.
-        Success in percent.
+        Rows of `make_row`, of the type left out.
     """
+    rows = []
+    for runs in group_evaluations(results):
+        config, test_type = runs[0][2], left_out_type(runs[0][2])
+        experiment, paper = find_paper(config, test_type)
+        rows.append(make_row(runs, results, test_type, experiment, paper))
+    return sort_rows(rows)
+
+
+def group_evaluations(results: pathlib.Path) -> list[Runs]:
+    """The evaluated runs of each experiment that leaves one type out and was evaluated on it."""
     groups: dict[str, list[tuple[str, dict, Config]]] = collections.defaultdict(list)
     for path in sorted((results / "arms" / "evaluations").glob("*.json")):
         folder = results / "arms" / "runs" / path.stem
@@ -45,23 +55,45 @@ def make_table1(results: pathlib.Path) -> list[dict]:
             assert isinstance(config.pool, ArmPoolConfig)
             if len(config.pool.left_out) == 1 and config.pool.left_out[0] in record["types"]:
                 groups[config.name].append((path.stem, record, config))
-    rows = [make_row(runs, results) for runs in groups.values()]
+    return list(groups.values())
+
+
+def left_out_type(config: Config) -> str:
+    """The one type that an experiment leaves out."""
+    assert isinstance(config.pool, ArmPoolConfig)
+    return config.pool.left_out[0]
+
+
+def find_paper(config: Config, left_out: str) -> tuple[int | None, tuple[float, float] | None]:
+    """The paper's number of an experiment and its success on the type left out; None for controls, which are ours alone."""
+    assert isinstance(config.env, ArmConfig)
+    of_paper = PAPER.get((config.task, config.env.random_hole > 0, left_out))
+    if of_paper is None or config.encoding.startswith("none+"):
+        return None, None
+    is_baseline = config.encoding == "none"
+    return of_paper[0] + is_baseline, of_paper[1 + is_baseline]
+
+
+def sort_rows(rows: Sequence[dict]) -> list[dict]:
+    """By the paper's number, controls last."""
     return sorted(rows, key=lambda row: (row["experiment"] or 99, row["task"], row["encoding"]))
 
 
-def make_row(runs: Sequence[tuple[str, dict, Config]], results: pathlib.Path) -> dict:
-    """The row of one experiment's seeds: (policy, record, config) of each."""
+def make_row(
+    runs: Runs, results: pathlib.Path, test_type: str, experiment: int | None, paper: tuple[float, float | None] | None
+) -> dict:
+    """What one experiment's seeds reach on one type of arms.
+
+    Returns:
+        experiment, task, train_types, test_type, algorithm, encoding, network, seeds, success_mean,
+        success_std_over_trials (mean over seeds), success_std_over_seeds, reachable_success_mean, control_steps, wall_seconds,
+        paper_mean and paper_std (of HCP-E for every v_h, of DDPG+HER for none, None for controls), policy (names), commit.
+        Success in percent.
+    """
     config = runs[0][2]
     assert isinstance(config.pool, ArmPoolConfig)
-    assert isinstance(config.env, ArmConfig)
-    test_type = config.pool.left_out[0]
     measured = [record["types"][test_type] for _, record, _ in runs]
     folders = [results / "arms" / "runs" / name for name, _, _ in runs]
-    of_paper = PAPER.get((config.task, config.env.random_hole > 0, test_type))
-    experiment = paper = None
-    if of_paper and not config.encoding.startswith("none+"):  # those are ours alone
-        is_baseline = config.encoding == "none"
-        experiment, paper = of_paper[0] + is_baseline, of_paper[1 + is_baseline]
     means = np.asarray([row["success_mean"] for row in measured])
     reachable = [row["reachable_success_mean"] for row in measured if row["reachable_success_mean"] is not None]
     return {

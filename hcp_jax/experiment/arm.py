@@ -18,8 +18,10 @@ from hcp_jax.envs.goal import GoalEnv
 from hcp_jax.envs.goal_episodes import GoalEpisodes, GoalEvaluator
 from hcp_jax.experiment.base import EVALUATION_SEED, TRAIN
 from hcp_jax.hardware.approach_poses import add_approach_poses
-from hcp_jax.hardware.arm import TYPES
+from hcp_jax.hardware.arm import OWN_TYPE, type_name
 from hcp_jax.hardware.arm_pool import make_arm_pool
+from hcp_jax.hardware.catalogue import load_robot
+from hcp_jax.hardware.own_arm import make_own_pool, make_own_variants
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.physics.base import make_physics
 from hcp_jax.policies.conditioning import Embedding
@@ -61,12 +63,13 @@ class ArmExperiment:
         """Success in percent of one episode per held-out robot, by kind and by type, and what to say about it."""
         policy = self.learner.policy(state)
         episodes = self.evaluator(policy, np.arange(self.heldout_pool.num_robots), jax.random.key(EVALUATION_SEED))
-        types = np.asarray([TYPES[int(number)] for number in self.heldout_pool.hardware["type"][:, 0]])
+        types = np.asarray([type_name(number) for number in self.heldout_pool.hardware["type"][:, 0]])
         names = tuple(dict.fromkeys(types))
-        untrained = [name for name in names if name not in self.pool_config.types]
+        untrained = [name for name in names if name not in (*self.pool_config.types, OWN_TYPE)]
         left_out = np.isin(types, untrained)
         metrics = summarise("train_types", episodes.take(~left_out))
-        line = f"success {metrics['train_types_success']:.1f} % on held-out robots of the training types"
+        robots = self.config.robot or "held-out robots of the training types"
+        line = f"success {metrics['train_types_success']:.1f} % on {robots}"
         if left_out.any():
             metrics |= summarise("left_out", episodes.take(left_out))
             line += f", {metrics['left_out_success']:.1f} % zero-shot on type {', '.join(untrained)}"
@@ -105,8 +108,12 @@ def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:
     pools, env_config = config.pool, config.env
     assert isinstance(pools, ArmPoolConfig)
     assert isinstance(env_config, ArmConfig)
-    train_pool = make_arm_pool(config.task, pools.ranges, pools.types, pools.robots_per_type, pools.seed, pools.split)
-    heldout_pool = make_heldout_arms(config, tuple(dict.fromkeys((*pools.types, *pools.left_out))), pools.heldout_per_type)
+    if config.robot:
+        train_pool, heldout_pool = make_own_pools(config)
+    else:
+        train_pool = make_arm_pool(config.task, pools.ranges, pools.types, pools.robots_per_type, pools.seed, pools.split)
+        types = tuple(dict.fromkeys((*pools.types, *pools.left_out)))
+        heldout_pool = make_heldout_arms(config, types, pools.heldout_per_type)
     task = ArmTask(config.task, **dataclasses.asdict(env_config))
 
     def make_env(pool: RobotPool, engine: str = physics, approach_starts: float = 0.0) -> GoalEnv:
@@ -147,6 +154,19 @@ def make_heldout_arms(config: Config, types: tuple[str, ...], num_per_type: int)
     pools = config.pool
     assert isinstance(pools, ArmPoolConfig)
     return make_arm_pool(config.task, pools.ranges, types, num_per_type, pools.seed, "heldout")
+
+
+def make_own_pools(config: Config) -> tuple[RobotPool, RobotPool]:
+    """What is trained on and what is evaluated where `config.robot` names an arm. Raises RobotFileError."""
+    pools = config.pool
+    assert isinstance(pools, ArmPoolConfig)
+    robot = load_robot(config.robot, config.robot_base or None, config.robot_tip or None)
+    own = make_own_pool(config.task, robot)
+    count = pools.heldout_per_type
+    heldout = own.subset(np.zeros(count, int)).replace(robot_id=own.robot_id + np.arange(count, dtype=np.int32))
+    if pools.robots_per_type == 1:
+        return own, heldout
+    return make_own_variants(config.task, robot, pools.ranges, pools.robots_per_type, pools.seed), heldout
 
 
 def make_goal_conditioning(config: Config, pool: RobotPool, train_pool: RobotPool) -> GoalConditioning:

@@ -121,16 +121,21 @@ def make_hopper_experiment(config: Config, physics: str) -> HopperExperiment:
     num_evaluated = min(config.eval_robots, train_pool.num_robots, heldout_pool.num_robots)
     rows = np.arange(num_evaluated)
     evaluation_pool = concatenate_pools(train_pool.subset(rows), heldout_pool.subset(rows))
+    evaluator = make_evaluator(ppo, make_env(evaluation_pool))
+    run = HopperExperiment(config, physics, train_pool, heldout_pool, ppo, make_env, evaluator, num_iterations)
+    if ppo.conditioning.is_learned and config.embedding.fit_steps:
+        run = dataclasses.replace(run, fitter=EmbeddingFitter(run, heldout_pool, config.embedding.fit_steps))
+    return run
+
+
+def make_evaluator(ppo: PPO, env: PoolEnv) -> Evaluator:
+    """Plays the robots of `env` with the mean action; its params are the network's and the observation statistics."""
 
     def policy(params, obs, v_h):
         network, statistics = params
         return ppo.mean_action(network, statistics, obs, v_h)
 
-    evaluator = Evaluator(make_env(evaluation_pool), policy)
-    run = HopperExperiment(config, physics, train_pool, heldout_pool, ppo, make_env, evaluator, num_iterations)
-    if ppo.conditioning.is_learned and config.embedding.fit_steps:
-        run = dataclasses.replace(run, fitter=EmbeddingFitter(run, heldout_pool, config.embedding.fit_steps))
-    return run
+    return Evaluator(env, policy)
 
 
 def make_heldout_pool(pool_config: PoolConfig, num_robots: int) -> RobotPool:

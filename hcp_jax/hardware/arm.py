@@ -25,6 +25,7 @@ REMOVED_JOINTS = {
     "K": (),
 }
 TYPES = tuple(REMOVED_JOINTS)
+OWN_TYPE = "own"  # an arm from a file: type number -1
 ARM_TEMPLATES = {"reacher": "arm_reacher.xml", "peg_insertion": "arm_peg.xml"}
 # Types of another template, which hold a peg: of peg insertion alone.
 OTHER_ARMS = {"J": "arm_straight_peg.xml", "K": "arm_fetch_peg.xml"}
@@ -55,6 +56,11 @@ LINK_EFFECTS = {
 LINKS = tuple(LINK_EFFECTS)
 
 Hardware = dict[str, np.ndarray]
+
+
+def type_name(number: float) -> str:
+    """The type that a pool's hardware `type` stands for."""
+    return OWN_TYPE if number < 0 else TYPES[int(number)]
 
 
 def sample_hardware(ranges: ArmRanges, robot_type: str, num_robots: int, seed: int, split: str = "train") -> Hardware:

@@ -17,6 +17,8 @@ from hcp_jax.hardware.start_poses import start_angles
 
 CHAIN_TEMPLATES = {"reacher": "chain_reacher.xml", "peg_insertion": "chain_peg.xml"}
 TYPE_STRIDE = 10_000  # between robot ids of two types
+# What a pool's `hardware` has of a chain under the same name.
+_HARDWARE = ("joint_range", "torque_limit", "damping", "frictionloss", "armature")
 
 
 def make_arm_pool(
@@ -50,8 +52,7 @@ def make_chain_pool(
     for chain in chains:
         edit_spec(spec, chain)
         models.append(spec.compile())
-    names = ("joint_range", "torque_limit", "damping", "frictionloss", "armature")
-    hardware = {name: np.stack([chain.padded(name) for chain in chains]) for name in names}
+    hardware = {name: np.stack([chain.padded(name) for chain in chains]) for name in _HARDWARE}
     hardware |= {
         "chain_pos": np.stack([chain.padded("pos") for chain in chains]),
         "chain_quat": np.stack([chain.padded("quat") for chain in chains]),
@@ -65,4 +66,18 @@ def make_chain_pool(
         fields=stack_models(models),
         hardware=hardware,
         robot_id=np.asarray(robot_id, np.int32),
+    )
+
+
+def read_pooled_chain(pool: RobotPool, row: int) -> Chain:
+    """The chain that robot `row` of a pool was made from, without its padding."""
+    count = int(pool.hardware["joint_mask"][row].sum())
+    slots = slice(1, count + 1)  # body 0 is the world
+    fields = {"mass": "body_mass", "com": "body_ipos", "inertia_quat": "body_iquat", "inertia": "body_inertia"}
+    hardware = {name: pool.hardware[name][row, :count] for name in _HARDWARE}
+    return Chain(
+        pos=pool.hardware["chain_pos"][row, : count + 1],
+        quat=pool.hardware["chain_quat"][row, : count + 1],
+        **{name: pool.fields[field][row, slots] for name, field in fields.items()},
+        **hardware,
     )

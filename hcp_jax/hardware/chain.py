@@ -7,6 +7,7 @@ and actions of every arm have the same size, with zeros at the end where joints 
 
 import dataclasses
 import itertools
+import xml.etree.ElementTree as ElementTree
 
 import mujoco
 import numpy as np
@@ -104,16 +105,14 @@ def read_chain(model: mujoco.MjModel, tip_site: str = TIP_SITE) -> Chain:
 
 
 def edit_spec(spec: mujoco.MjSpec, chain: Chain) -> None:
-    """Writes `chain` into a chain template (`chain_reacher.xml`, `chain_peg.xml`)."""
+    """Writes `chain` into a chain template (`chain_reacher.xml`, `chain_peg.xml`), whose slots beyond it may be gone."""
     n = chain.num_joints
     mass, com = chain.padded("mass"), chain.padded("com")
     inertia_quat, inertia = chain.padded("inertia_quat"), chain.padded("inertia")
-    pos, quat = np.zeros((MAX_JOINTS, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (MAX_JOINTS, 1))
-    pos[:n], quat[:n] = chain.pos[:n], chain.quat[:n]
-    for i in range(MAX_JOINTS):
+    place_bodies(spec, chain.pos, chain.quat)
+    for i in range(len(spec.joints)):
         active = i < n
         body, joint = spec.body(f"slot{i}"), spec.joint(f"slot{i}")
-        body.pos, body.quat = pos[i], quat[i]
         body.mass = mass[i] if active else _NO_MASS
         body.ipos, body.iquat = (com[i], inertia_quat[i]) if active else (_PADDED_COM, _PADDED_INERTIA_QUAT)
         body.inertia = inertia[i] if active else np.full(3, _NO_INERTIA)
@@ -124,8 +123,32 @@ def edit_spec(spec: mujoco.MjSpec, chain: Chain) -> None:
         gear = np.zeros(6)
         gear[0] = chain.torque_limit[i] if active else 0.0
         spec.actuator(f"slot{i}").gear = gear
+
+
+def place_bodies(spec: mujoco.MjSpec, pos: np.ndarray, quat: np.ndarray) -> None:
+    """Puts the slots of a chain template, and its tool, where an arm of n joints has them: pos [n + 1, 3], quat [n + 1, 4]."""
+    for i in range(len(spec.joints)):
+        body = spec.body(f"slot{i}")
+        body.pos, body.quat = (pos[i], quat[i]) if i < len(pos) - 1 else (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
     tool = spec.body("tool")
-    tool.pos, tool.quat = chain.pos[n], chain.quat[n]
+    tool.pos, tool.quat = pos[-1], quat[-1]
+
+
+def without_padding(template: str, num_joints: int) -> str:
+    """A chain template's MJCF with `num_joints` slots alone, the tool on the last of them."""
+    root = ElementTree.fromstring(template)
+    if num_joints < MAX_JOINTS:
+        parents = {child: parent for parent in root.iter("body") for child in parent}
+        bodies = {body.get("name"): body for body in root.iter("body")}
+        last, tool = bodies[f"slot{num_joints - 1}"], bodies["tool"]
+        parents[tool].remove(tool)
+        last.remove(bodies[f"slot{num_joints}"])
+        last.append(tool)
+        actuators = root.find("actuator")
+        assert actuators is not None
+        for motor in list(actuators)[num_joints:]:
+            actuators.remove(motor)
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def _joints_towards(model: mujoco.MjModel, body: int) -> list[int]:

@@ -6,17 +6,19 @@ import itertools
 import jax
 import numpy as np
 
-from hcp_jax.hardware.arm import TYPES
+from hcp_jax.hardware.arm import TYPES, sample_hardware
 from hcp_jax.hardware.arm_encodings import encode_arms
 from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES, make_chain_pool
 from hcp_jax.hardware.chain import MAX_JOINTS, Chain
-from hcp_jax.hardware.inverse_kinematics import solve_positions
+from hcp_jax.hardware.inverse_kinematics import NUM_STARTS, solve_positions
 from hcp_jax.hardware.pool import RobotPool
+from hcp_jax.hardware.ranges import ArmRanges
 from hcp_jax.hardware.robot_file import RobotFile, RobotFileError
 from hcp_jax.hardware.start_poses import GRID
 
 OWN_ID = 9_000_000  # above those of every split
 _MAX_ERROR = 0.01  # [m] of a start pose from its point
+_START_SPREADS = (0.1, 0.3, 1.0, np.pi)  # [rad] about 0, of the joints that the search for start poses begins at
 _LEAST_SPREAD = 0.05  # [m], [rad] of an entry that hardly differs among the training arms
 SCALARS = ("torque_limit", "link_mass", "damping", "frictionloss", "armature")
 
@@ -39,28 +41,48 @@ class Entry:
 def make_own_pool(task: str, robot: RobotFile) -> RobotPool:
     """A pool of this one arm, standing where the file puts its base.
 
-    Its start poses are those of the training arms: for the reacher the points of `GRID` that it reaches, for peg insertion all
-    joints at 0, or as near as their ranges allow.
+    Its start poses are those of the training arms: for the reacher the points of `GRID` that it reaches, solved from joints as
+    near to 0 as leads there, for peg insertion all joints at 0, or as near as their ranges allow.
 
     Raises:
         RobotFileError: it reaches no point that the reacher starts from.
     """
-    zero = np.clip(np.zeros(MAX_JOINTS), *robot.chain.padded("joint_range").T)[None]
-    pool = _make_pool(task, robot.chain, zero)
+    joint_range = robot.chain.padded("joint_range")
+    zero = np.clip(np.zeros(MAX_JOINTS), *joint_range.T)
+    pool = _make_pool(task, [robot.chain], zero[None])
     if task == "peg_insertion":
         return pool
     points = np.asarray(list(itertools.product(*GRID)))
-    repeated = pool.subset(np.zeros(len(points), int))
-    solution = solve_positions(repeated, points, jax.random.key(0))
-    reached = solution.distance < _MAX_ERROR
+    repeated, rng = pool.subset(np.zeros(len(points), int)), np.random.default_rng(0)
+    distance, angles = np.full(len(points), np.inf), np.zeros((len(points), MAX_JOINTS))
+    for spread in _START_SPREADS:
+        starts = zero + spread * rng.uniform(-1.0, 1.0, (len(points), NUM_STARTS, MAX_JOINTS))
+        solution = solve_positions(repeated, points, jax.random.key(0), starts=np.clip(starts, *joint_range.T))
+        better = (distance >= _MAX_ERROR) & (solution.distance < distance)
+        distance[better], angles[better] = solution.distance[better], solution.angles[better]
+    reached = distance < _MAX_ERROR
     if not reached.any():
-        nearest = float(solution.distance.min())
-        raise RobotFileError(f"reaches no point that the reacher starts from; it comes within {nearest:.2f} m of one")
-    return _make_pool(task, robot.chain, np.asarray(solution.angles[reached], np.float64))
+        raise RobotFileError(f"reaches no point that the reacher starts from; it comes within {distance.min():.2f} m of one")
+    return _make_pool(task, [robot.chain], angles[reached])
 
 
-def _make_pool(task: str, chain: Chain, start_angles: np.ndarray) -> RobotPool:
-    return make_chain_pool(CHAIN_TEMPLATES[task], [chain], np.array([OWN_ID]), np.array([-1]), start_angles[None])
+def make_own_variants(task: str, robot: RobotFile, ranges: ArmRanges, count: int, seed: int) -> RobotPool:
+    """`count` times this arm, with masses (times `ranges.mass_ratio`) and joint dynamics drawn; its links are as long as they
+    are. Raises RobotFileError as `make_own_pool` does."""
+    start_angles = make_own_pool(task, robot).hardware["start_angles"][0]
+    drawn, chain = sample_hardware(ranges, "I", count, seed), robot.chain
+    chains = []
+    for row in range(count):
+        values = {name: rows[row, : chain.num_joints] for name, rows in drawn.items() if name != "length_change"}
+        ratio = values.pop("mass_ratio")
+        chains.append(dataclasses.replace(chain, mass=chain.mass * ratio, inertia=chain.inertia * ratio[:, None], **values))
+    return _make_pool(task, chains, start_angles)
+
+
+def _make_pool(task: str, chains: list[Chain], start_angles: np.ndarray) -> RobotPool:
+    count = len(chains)
+    starts = np.tile(start_angles, (count, 1, 1))
+    return make_chain_pool(CHAIN_TEMPLATES[task], chains, OWN_ID + np.arange(count), np.full(count, -1), starts)
 
 
 def compare_with(own: RobotPool, trained: RobotPool) -> list[Entry]:

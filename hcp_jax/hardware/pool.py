@@ -13,6 +13,8 @@ import mujoco
 import numpy as np
 from flax import struct
 
+from hcp_jax.errors import UserError
+
 # Every MjModel field that lengths, masses and joint dynamics drag along. `stack_models` refuses variants that differ in
 # any other field, so that a field can be forgotten neither here nor by a backend.
 VARIANT_FIELDS = (
@@ -48,7 +50,7 @@ FORMAT = 1
 Array = Any  # numpy.ndarray on the host, jax.Array in jitted code
 
 
-class PoolError(ValueError):
+class PoolError(UserError):
     """A pool's files are missing, damaged or of another format, or its robots do not fit one template."""
 
 

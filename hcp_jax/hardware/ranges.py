@@ -4,6 +4,8 @@ import dataclasses
 
 import numpy as np
 
+from hcp_jax.errors import UserError
+
 Range = tuple[float, float]
 
 # Purposes of random draws, and the distance between their robot ids: held-out robots never depend on how many training
@@ -16,7 +18,7 @@ SPLIT_STRIDE = 1_000_000
 SHORTEST_LINK_CHANGE = -0.25
 
 
-class RangeError(ValueError):
+class RangeError(UserError):
     """A range is empty, reversed or outside what physics allows."""
 
 

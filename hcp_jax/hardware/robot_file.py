@@ -5,6 +5,7 @@ may be missing; those that are there are read only for the masses of links that 
 """
 
 import dataclasses
+import itertools
 import json
 import pathlib
 import subprocess
@@ -15,18 +16,20 @@ from xml.parsers import expat
 import mujoco
 import numpy as np
 
+from hcp_jax.errors import UserError
 from hcp_jax.hardware.chain import MAX_JOINTS, Chain, ChainError, read_chain
 
 MAX_BYTES = 20_000_000
 MAX_SECONDS = 9.0
-# What is assumed where a file says nothing, as the arms that policies were trained on: [N m] of joint 0 to 6, [kg m^2].
+# What is assumed where a file says nothing: [N m] of joint 0 to 6, as the arms that policies were trained on; [N m s/rad],
+# [kg m^2]. A geared joint has both: without them a light wrist accelerates by 1000 rad/s^2, and 4 ms steps diverge.
 ASSUMED_TORQUE_LIMITS = (80.0, 80.0, 40.0, 40.0, 9.0, 9.0, 9.0)
-ASSUMED_ARMATURE = 0.01
+ASSUMED_DAMPING, ASSUMED_ARMATURE = 1.0, 0.1
 _TIP_SITE = "hcp_jax tip"  # a name that no file has
 _MIN_INERTIA = 1e-12  # [kg], [kg m^2]
 
 
-class RobotFileError(ValueError):
+class RobotFileError(UserError):
     """A robot file cannot be read as a serial arm."""
 
 
@@ -296,18 +299,19 @@ def check_chain(chain: Chain, model: mujoco.MjModel, joints: list, notes: list[s
         notes.append(f"continuous joints limited to +-pi: {', '.join(unlimited)}")
     if (np.diff(chain.joint_range) <= 0).any():
         raise RobotFileError(f"joint {names[int(np.argmin(np.diff(chain.joint_range)))]}: empty range")
-    torque, armature = chain.torque_limit.copy(), chain.armature.copy()
-    open_torques, open_armatures = torque <= 0, armature <= 0
-    torque[open_torques] = np.asarray(ASSUMED_TORQUE_LIMITS)[: len(torque)][open_torques]
-    armature[open_armatures] = ASSUMED_ARMATURE
-    if open_torques.any():
-        assumed = ", ".join(
-            f"{name} {value:g}" for name, value, is_open in zip(names, torque, open_torques, strict=True) if is_open
-        )
-        notes.append(f"torque limits assumed [N m]: {assumed}")
-    if open_armatures.any():
-        notes.append(f"armature assumed: {ASSUMED_ARMATURE} kg m^2 of {int(open_armatures.sum())} joints")
-    return dataclasses.replace(chain, torque_limit=torque, armature=armature)
+    torque_limit = np.asarray(ASSUMED_TORQUE_LIMITS)[: len(names)]
+    filled = {}
+    for field, assumed, label in (
+        ("torque_limit", torque_limit, "torque limits assumed [N m]"),
+        ("damping", np.full(len(names), ASSUMED_DAMPING), "damping assumed [N m s/rad]"),
+        ("armature", np.full(len(names), ASSUMED_ARMATURE), "armature assumed [kg m^2]"),
+    ):
+        is_open = getattr(chain, field) <= 0
+        filled[field] = np.where(is_open, assumed, getattr(chain, field))
+        if is_open.any():
+            values = (f"{name} {value:g}" for name, value in zip(names, filled[field], strict=True))
+            notes.append(f"{label}: {', '.join(itertools.compress(values, is_open))}")
+    return dataclasses.replace(chain, **filled)
 
 
 def relative_to(chain: Chain, model: mujoco.MjModel, base: str) -> Chain:

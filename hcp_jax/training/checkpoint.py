@@ -8,10 +8,11 @@ import jax
 import orbax.checkpoint as ocp
 from absl import logging as absl_logging
 
+from hcp_jax.errors import UserError
 from hcp_jax.experiment.base import TrainingState
 
 
-class CheckpointError(RuntimeError):
+class CheckpointError(UserError):
     """No usable checkpoint, or one that does not fit the configuration."""
 
 

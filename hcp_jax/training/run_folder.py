@@ -14,6 +14,7 @@ from collections.abc import Iterator
 import jax
 
 from hcp_jax.config import Config, ConfigError, from_dict, to_dict
+from hcp_jax.errors import UserError
 
 CONFIG_FILE = "config.json"
 ENVIRONMENT_FILE = "environment.json"
@@ -24,7 +25,7 @@ _CHANGEABLE = {"total_env_steps", "keep_checkpoints"}
 _PACKAGES = ("jax", "jaxlib", "mujoco", "mujoco-mjx", "warp-lang", "brax", "flax", "optax", "orbax-checkpoint", "numpy")
 
 
-class RunFolderError(ValueError):
+class RunFolderError(UserError):
     """The run folder exists, is missing, is empty or holds another run."""
 
 

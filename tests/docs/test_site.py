@@ -3,6 +3,7 @@
 import dataclasses
 import importlib.util
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -81,6 +82,19 @@ def test_a_field_without_text_is_seen(pages):
     text, meanings = pages.read_attributes(Sample)
     assert text == "A sample."
     assert meanings == {"first": "one | two, and three."}
+
+
+def test_every_field_that_a_page_sets_exists():
+    known = {*field_names(hopper("a", "none")), *field_names(arm("a", "reacher", "none"))}
+    for page in (ROOT / "docs").glob("*.md"):
+        for name in re.findall(r"--config\.([\w.]+)=", page.read_text()):
+            assert name in known, f"{page.name}: --config.{name}"
+
+
+def test_every_module_that_a_page_runs_exists():
+    for page in (ROOT / "docs").glob("*.md"):
+        for name in re.findall(r"python\s-m (hcp_jax[\w.]*)", page.read_text()):
+            assert importlib.util.find_spec(name) is not None, f"{page.name}: python -m {name}"
 
 
 def test_the_site_builds_without_a_warning(tmp_path):

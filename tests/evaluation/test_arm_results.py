@@ -4,6 +4,7 @@ import shutil
 import pytest
 
 from hcp_jax import collect, evaluate
+from hcp_jax.evaluation.appendix import make_appendix
 from hcp_jax.evaluation.arm_sweeps import evaluate_arms
 from hcp_jax.evaluation.table1 import make_table1
 from hcp_jax.training.metrics import read_rows
@@ -28,6 +29,9 @@ def test_collected_successes_come_from_the_run_folder(results, finished_arms):
 def test_a_published_arm_policy_moves_as_its_run_does(results, finished_arms):
     records = [evaluate_arms(folder, 1, 2, types=("H",)) for folder in (finished_arms, results / "policies" / "arms_s0")]
     assert records[0]["robots"] == records[1]["robots"]
+    measured, robots = records[0]["types"]["H"], records[0]["robots"]
+    assert measured["final_distances"] == pytest.approx([robot["final_distance"] for robot in robots], abs=1e-4)
+    assert measured["episode_lengths"] == [robot["episode_length"] for robot in robots]
 
 
 def test_table_1_has_a_row_beside_the_papers_for_what_was_evaluated(results):
@@ -42,3 +46,18 @@ def test_table_1_has_a_row_beside_the_papers_for_what_was_evaluated(results):
     assert (row["paper_mean"], row["paper_std"]) == (92.5, 1.96)
     assert (row["success_mean"], row["control_steps"]) == (round(measured["success_mean"], 2), 320)
     assert (row["seeds"], row["policy"], row["success_std_over_seeds"]) == ([0], ["arms_s0"], None)
+    by_type = {row["test_type"]: row for row in make_appendix(results)}
+    assert set(by_type) == {"A", "I"}
+    assert (by_type["A"]["experiment"], by_type["A"]["paper_mean"]) == (1, 93.1)
+    measured = json.loads((evaluations / "arms_s0.json").read_text())["types"]["A"]
+    assert by_type["A"]["success_mean"] == round(measured["success_mean"], 2)
+
+
+def test_a_run_that_is_collected_later_is_added_to_those_before(results, finished_arms, tmp_path):
+    shutil.copytree(finished_arms, tmp_path / "runs" / "arms_s1")
+    config = json.loads((finished_arms / "config.json").read_text()) | {"seed": 1}
+    (tmp_path / "runs" / "arms_s1" / "config.json").write_text(json.dumps(config))
+    shutil.copytree(results, tmp_path / "results")
+    collect.main([str(tmp_path / "runs"), "--out", str(tmp_path / "results")])
+    (row,) = json.loads((tmp_path / "results" / "arms" / "summary.json").read_text())
+    assert row["seeds"] == [0, 1]

@@ -69,6 +69,16 @@ def test_a_padded_arm_moves_as_the_arm_itself_in_contact(robot_type):
     np.testing.assert_allclose(moved[: arm.nq], expected, atol=1e-4)
 
 
+@pytest.mark.parametrize("robot_type", TYPES)
+def test_the_gripper_reaches_from_the_peg_back_to_the_wrist(robot_type):
+    arm = arm_spec("peg_insertion", robot_type).compile()
+    data = mujoco.MjData(arm)
+    mujoco.mj_kinematics(arm, data)
+    peg, wrist = data.site("ref_pt"), data.body("l6").xpos
+    towards_wrist = peg.xmat.reshape(3, 3).T @ (wrist - peg.xpos)
+    np.testing.assert_allclose(towards_wrist, [0.175, 0.0, 0.11], atol=0.012)  # the gripper's capsule lies along x
+
+
 def test_every_type_lacks_the_joints_that_the_paper_removes():
     for robot_type, removed in REMOVED_JOINTS.items():
         pool = make_arm_pool("peg_insertion", ArmRanges(), [robot_type], 1, seed=0)

@@ -1,0 +1,60 @@
+"""`python -m hcp_jax.catalogue POLICY [--fine-tuned RUN ...] [--json results/catalogue.json]`: real arms beside each other."""
+
+import argparse
+import pathlib
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from hcp_jax import command_line
+from hcp_jax.config import ConfigError
+from hcp_jax.evaluation.catalogue_table import make_catalogue_table
+from hcp_jax.evaluation.statistics import write_json
+from hcp_jax.hardware.catalogue import catalogue_names
+from hcp_jax.physics.base import INTEGRATORS, PHYSICS
+
+
+def main(arguments: list[str] | None = None) -> None:
+    parser = command_line.OneLineParser(
+        prog="hcp_jax.catalogue",
+        description="Plays a policy on every arm of the catalogue, without training and after fine-tuning.",
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    parser.add_argument("policy", type=pathlib.Path, help="run folder or published policy of arms")
+    parser.add_argument("--fine-tuned", nargs="*", type=pathlib.Path, default=[], help="run folders of experiments/finetune.py")
+    parser.add_argument("--robots", nargs="*", default=[], help=f"some of {', '.join(catalogue_names())}; all if left out")
+    parser.add_argument("--trials", type=int, default=10)
+    parser.add_argument("--episodes-per-trial", type=int, default=100)
+    parser.add_argument("--physics", default="auto", choices=[*PHYSICS, *(f"native-{name}" for name in INTEGRATORS)])
+    parser.add_argument("--json", type=pathlib.Path, help="file to write the table to")
+    options = parser.parse_args(arguments)
+    with command_line.user_errors_end_the_command():
+        for name in ("trials", "episodes_per_trial"):
+            if getattr(options, name) < 1:
+                raise ConfigError(f"--{name.replace('_', '-')}={getattr(options, name)}: expected at least 1")
+        command_line.enable_compilation_cache()
+        settings = {"names": options.robots, "physics": options.physics}
+        rows = make_catalogue_table(options.policy, options.fine_tuned, options.trials, options.episodes_per_trial, **settings)
+    print_table(rows)
+    if options.json:
+        write_json(options.json, rows)
+
+
+def print_table(rows: list[dict]) -> None:
+    """One row per arm, and the median over them."""
+    table = Table(title="success [%] on the goals of the task")
+    for head in ("arm", "goals in reach [%]", "zero-shot", "of goals in reach", "fine-tuned", "of goals in reach"):
+        table.add_column(head, justify="left" if head == "arm" else "right")
+    for row in rows:
+        values = [row["reachable_share"]]
+        for part in (row["zero_shot"], row["fine_tuned"] or {}):
+            values += [part.get("success_mean"), part.get("reachable_success_mean")]
+        table.add_row(row["robot"], *("n/a" if value is None else f"{value:.1f}" for value in values))
+    console = Console()
+    console.print(table)
+    console.print(f"median zero-shot success: {np.median([row['zero_shot']['success_mean'] for row in rows]):.1f} %")
+
+
+if __name__ == "__main__":
+    main()

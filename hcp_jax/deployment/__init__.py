@@ -1,0 +1,1 @@
+"""A policy for one robot, as files that run without this package."""

@@ -1,0 +1,177 @@
+"""Reading published records back. What is damaged is an error that names its file."""
+
+import contextlib
+import csv
+import dataclasses
+import json
+import math
+import pathlib
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from hcp_jax.errors import UserError
+from hcp_jax.evaluation.summary import read_curve
+from hcp_jax.training.metrics import METRICS_FILE
+from hcp_jax.training.run_folder import RunFolderError
+
+QUANTILES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0)  # of the final distance, in records of arms
+
+
+class RecordError(UserError):
+    """A published file is damaged, or was written by another version."""
+
+
+@contextlib.contextmanager
+def naming(path: pathlib.Path) -> Iterator[None]:
+    """Whatever is wrong with a file's content becomes a RecordError that names it."""
+    try:
+        yield
+    except (RecordError, RunFolderError):  # name it already
+        raise
+    except KeyError as error:
+        raise RecordError(f"{path}: damaged or of another version (no field {error})") from error
+    except (ValueError, TypeError, AttributeError, IndexError, ArithmeticError, csv.Error) as error:
+        raise RecordError(f"{path}: damaged or of another version ({error})") from error
+
+
+def read_json(path: pathlib.Path, kind: type):
+    """The `kind` (dict or list) in a JSON file. Raises RecordError if it is damaged or holds something else."""
+    with naming(path):
+        content = json.loads(path.read_text())
+        if not isinstance(content, kind):
+            raise TypeError(f"holds a {type(content).__name__}, expected a {kind.__name__}")
+        return content
+
+
+def number(value: object) -> float:
+    """A finite number of a record. Raises ValueError."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"{value!r} is no finite number")
+    return float(value)
+
+
+def optional_number(value: object) -> float | None:
+    return None if value is None else number(value)
+
+
+@dataclasses.dataclass(frozen=True)
+class TableRow:
+    """A row of `table1.json` or `appendix.json`, as `table1.make_row` gives it."""
+
+    experiment: int | None
+    task: str
+    train_types: str
+    test_type: str
+    algorithm: str
+    encoding: str
+    network: str
+    seeds: tuple[int, ...]
+    success_mean: float
+    success_std_over_trials: float
+    success_std_over_seeds: float | None
+    reachable_success_mean: float | None
+    control_steps: int
+    wall_seconds: float
+    paper_mean: float | None
+    paper_std: float | None
+    policy: tuple[str, ...]
+    commit: tuple[str, ...]
+
+
+def read_table(path: pathlib.Path) -> list[TableRow]:
+    """Raises RecordError if the file is damaged or its rows have other fields."""
+    rows = read_json(path, list)
+    with naming(path):
+        return [_table_row(row) for row in rows]
+
+
+def _table_row(row: dict) -> TableRow:
+    texts = {name: str(row[name]) for name in ("task", "train_types", "test_type", "algorithm", "encoding", "network")}
+    numbers = {name: number(row[name]) for name in ("success_mean", "success_std_over_trials", "wall_seconds")}
+    may_lack = ("success_std_over_seeds", "reachable_success_mean", "paper_mean", "paper_std")
+    return TableRow(
+        **texts,
+        **numbers,
+        **{name: optional_number(row[name]) for name in may_lack},
+        experiment=None if row["experiment"] is None else int(row["experiment"]),
+        seeds=tuple(int(seed) for seed in row["seeds"]),
+        control_steps=int(row["control_steps"]),
+        policy=tuple(str(name) for name in row["policy"]),
+        commit=tuple(str(name) for name in row["commit"]),
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """What a policy reached on one type of arms.
+
+    Attributes:
+        zero_shot: the type was not trained on.
+        success_mean, success_std: [%] over trials.
+        episode_length_mean: [control steps].
+        distance_quantiles: [m] of the final distance, in the order of `QUANTILES`.
+        final_distances: [N] m and
+        episode_lengths: [N] control steps of each arm; None in records that hold quantiles alone.
+    """
+
+    zero_shot: bool
+    success_mean: float
+    success_std: float
+    episode_length_mean: float
+    distance_quantiles: tuple[float, ...]
+    final_distances: np.ndarray | None
+    episode_lengths: np.ndarray | None
+
+
+@dataclasses.dataclass(frozen=True)
+class Evaluation:
+    """A record of arms that `evaluate --json` wrote."""
+
+    path: pathlib.Path
+    policy: str
+    task: str
+    encoding: str
+    trials: int
+    robots_per_trial: int
+    ranges: Mapping[str, tuple[float, float]]
+    types: Mapping[str, Outcome]
+
+
+def read_evaluation(path: pathlib.Path) -> Evaluation:
+    """Raises RecordError if the file is damaged or no evaluation of arms."""
+    record = read_json(path, dict)
+    with naming(path):
+        return Evaluation(
+            path=path,
+            policy=pathlib.PurePath(record["run"]).name,
+            task=str(record["task"]),
+            encoding=str(record["encoding"]),
+            trials=int(record["trials"]),
+            robots_per_trial=int(record["robots_per_trial"]),
+            ranges={name: (number(low), number(high)) for name, (low, high) in record["ranges"].items()},
+            types={name: _outcome(values) for name, values in record["types"].items()},
+        )
+
+
+def _outcome(values: dict) -> Outcome:
+    return Outcome(
+        zero_shot=bool(values["zero_shot"]),
+        success_mean=number(values["success_mean"]),
+        success_std=number(values["success_std"]),
+        episode_length_mean=number(values["episode_length_mean"]),
+        distance_quantiles=tuple(number(values["final_distance_quantiles"][f"{q:g}"]) for q in QUANTILES),
+        final_distances=_numbers(values.get("final_distances")),
+        episode_lengths=_numbers(values.get("episode_lengths")),
+    )
+
+
+def _numbers(values: list | None) -> np.ndarray | None:
+    """[N] numbers, None if there are none."""
+    return np.asarray([number(value) for value in values]) if values else None
+
+
+def read_learning_curve(folder: pathlib.Path, column: str) -> np.ndarray:
+    """`summary.read_curve` of a published run: [E, 2]. Raises RecordError if its metrics are damaged."""
+    with naming(folder / METRICS_FILE):
+        return read_curve(folder, column)

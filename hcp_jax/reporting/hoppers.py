@@ -1,0 +1,124 @@
+"""The hopper: learning curves, new hoppers, and the learned embedding."""
+
+import numpy as np
+
+from hcp_jax.config import Config
+from hcp_jax.evaluation.records import naming, number, optional_number, read_json
+from hcp_jax.evaluation.summary import RETURNS
+from hcp_jax.reporting.curves import SPREAD, draw_groups
+from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
+from hcp_jax.reporting.plots import draw_embedding
+from hcp_jax.reporting.published import Published
+
+LABEL = "return of one episode"
+KINDS = {
+    "train_return": "robots trained on",
+    "heldout_return": "held-out robots",
+    "heldout_fitted_return": "held-out robots, v_h fitted",
+}
+COLLECT_COMMAND = "python -m hcp_jax.collect runs/hopper --out results"
+
+
+def hopper_section(published: Published) -> Section:
+    """Everything of the hopper. The paper gives no numbers of it, only figures."""
+    return Section(
+        "hopper",
+        "Hopper",
+        (make_performance(published), make_new_hoppers(published), make_embedding(published)),
+        f"The paper shows these as figures without numbers, so there are none to set beside ours. {SPREAD}",
+    )
+
+
+def make_performance(published: Published) -> Item:
+    """A row for each algorithm, and its curves."""
+    path, rows = published.find("hopper/summary.json"), []
+    for row in read_json(path, list) if path else ():
+        with naming(path):
+            returns = [show_return(row[f"{kind}_mean"], row[f"{kind}_std"]) for kind in RETURNS]
+            steps, minutes = f"{number(row['env_steps']) / 1e6:.2f}", f"{number(row['wall_seconds']) / 60:.0f}"
+            cells = (
+                str(row["algorithm"]),
+                str(row["encoding"]),
+                str(row["name"]),
+                *returns,
+                str(len(row["seeds"])),
+                steps,
+                minutes,
+            )
+            rows.append(Row(cells))
+    columns = ("algorithm", "v_h", "experiment", *KINDS.values(), "seeds", "control steps [M]", "minutes")
+    tables = ()
+    if rows:
+        caption = "Return at the end: mean and standard deviation over seeds"
+        tables = (Table(caption, columns, "llcrrrrrr", tuple(rows), (published.show(path),)),)
+    hoppers = [run.config for run in published.hoppers]
+    names = [config.name for config in hoppers if config.pool.split != "new" and config.name != "hopper_embedding"]
+    groups = published.runs_of(list(dict.fromkeys(names)))
+    figures = [
+        draw_groups(published, groups, f"{kind}_mean", f"{text.capitalize()}.", LABEL, None) for kind, text in KINDS.items()
+    ]
+    commands = ("python -m hcp_jax.sweep experiments/hopper_curves.py --seeds 3 --out runs/hopper", COLLECT_COMMAND)
+    return Item("Learning curves", "", tables, tuple(figure for figure in figures if figure), commands)
+
+
+def make_new_hoppers(published: Published) -> Item:
+    """100 new hoppers: from another policy and from scratch."""
+    path, rows = published.find("hopper/finetune.json"), []
+    for row in read_json(path, list) if path else ():
+        with naming(path):
+            goal, reached = number(row["scratch_env_steps"]), optional_number(row["pretrained_steps_to_scratch_final"])
+            cells = (
+                str(row["run"]),
+                str(row["init_layers"]),
+                f"{number(row['scratch_final_return']):.1f}",
+                f"{goal / 1e6:.2f}",
+                "not reached" if reached is None else f"{reached / 1e6:.2f}",
+                "" if reached is None else f"{100 * reached / goal:.1f}",
+                f"{number(row['pretrained_final_return']):.1f}",
+            )
+            rows.append(Row(cells))
+    columns = ("run", "layers", "from scratch, in the end", "after [M steps]", "pretrained there after [M steps]")
+    columns += ("share of steps [%]", "pretrained, in the end")
+    tables = ()
+    if rows:
+        tables = (
+            Table("Steps to the return of a training from scratch", columns, "clrrrrr", tuple(rows), (published.show(path),)),
+        )
+    names = dict.fromkeys(run.config.name for run in published.hoppers if run.config.pool.split == "new")
+    groups, caption = published.runs_of(list(names)), "The 100 new hoppers."
+    figure = draw_groups(published, groups, "train_return_mean", caption, LABEL, None, name_start)
+    train, init = "python -m hcp_jax.train --config experiments", "--config.init=results/policies/hopper_hcpi_s0"
+    commands = (
+        f"{train}/hopper_finetune_scratch.py --out runs/hopper/hopper_finetune_scratch_s0",
+        f"{train}/hopper_finetune_hidden.py --out runs/hopper/hopper_finetune_hidden_s0 {init}",
+        f"{train}/hopper_finetune.py --out runs/hopper/hopper_finetune_s0 {init}",
+        COLLECT_COMMAND,
+    )
+    return Item("Transfer to 100 new hoppers", "", tables, (figure,) if figure else (), commands)
+
+
+def name_start(config: Config) -> str:
+    return f"pretrained, {config.init_layers} layers" if config.init else "from scratch"
+
+
+def make_embedding(published: Published) -> Item:
+    """The learned v_h of hoppers that differ in torso mass alone."""
+    path = published.find("hopper/embedding.json")
+    figures, text = (), "Hoppers that differ in torso mass alone, each with two learned numbers."
+    if path:
+        record = read_json(path, dict)
+        with naming(path):
+            points = np.asarray([[number(value) for value in row] for row in record["embedding"]]).reshape(-1, 2)
+            mass = np.asarray([number(value) for value in record["torso_mass"]])
+            if len(points) != len(mass):
+                raise ValueError(f"{len(points)} rows of embedding, {len(mass)} of torso_mass")
+            r2 = f"R\N{SUPERSCRIPT TWO} {number(record['r2']):.4f}, cross-validated"
+            text += f" The mean mass of the {int(record['neighbours'])} nearest others predicts the mass with {r2}."
+        figures = (Figure(draw_embedding(points, mass), f"Each of {len(points)} dots is a hopper.", (published.show(path),)),)
+    train = "python -m hcp_jax.train --config experiments/hopper_embedding.py --out runs/hopper/hopper_embedding_s0"
+    return Item("Embedding", text, (), figures, (train, COLLECT_COMMAND))
+
+
+def show_return(mean: object, deviation: object) -> str:
+    """`5405.8 ± 142.3`, or nothing for what an algorithm does not have."""
+    return "" if mean is None else f"{number(mean):.1f} \N{PLUS-MINUS SIGN} {number(deviation):.1f}"

@@ -1,0 +1,63 @@
+"""The paper's sixteen experiments, as the report names them."""
+
+import dataclasses
+
+from hcp_jax.evaluation.table1 import PAPER
+
+TASKS = ("reacher", "peg insertion, fixed hole", "peg insertion, random hole")
+ROMAN = ("I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX", "X", "XI", "XII", "XIII", "XIV", "XV", "XVI")
+RESULTS_COMMANDS = (
+    "python -m hcp_jax.sweep experiments/table1.py --seeds 3 --out runs/arms   # trains",
+    "python -m hcp_jax.collect runs/arms --out results                         # publishes metrics and policies",
+)
+EVALUATE_COMMAND = (
+    "python -m hcp_jax.evaluate results/policies/{name} --without-robots --json results/arms/evaluations/{name}.json"
+)
+TABLES_COMMAND = "python -m hcp_jax.collect runs/arms --out results                         # writes the tables"
+
+
+@dataclasses.dataclass(frozen=True)
+class Setting:
+    """What one type is left out of: two experiments of the paper, and our own beside them.
+
+    Attributes:
+        experiment: the paper's number of HCP-E; that of DDPG+HER is the next.
+        task: one of `TASKS`.
+        prefix: of its experiments' names: `reacher`, `peg` or `random_peg`.
+        left_out: the type.
+        paper: success on that type of HCP-E and of DDPG+HER, mean and deviation [%].
+    """
+
+    experiment: int
+    task: str
+    prefix: str
+    left_out: str
+    paper: tuple[tuple[float, float], tuple[float, float]]
+
+    @property
+    def title(self) -> str:
+        return f"Exp. {roman(self.experiment)} and {roman(self.experiment + 1)}: {self.task}, type {self.left_out} left out"
+
+    def experiment_name(self, algorithm: str) -> str:
+        """The file in `experiments/` that trains `hcpe` or `ddpg`."""
+        return f"{self.prefix}_{algorithm}_leave_{self.left_out.lower()}"
+
+    def trains(self, name: str) -> bool:
+        """Whether an experiment of this name is of this setting."""
+        return name.startswith(f"{self.prefix}_") and name.endswith(f"_leave_{self.left_out.lower()}")
+
+
+def roman(experiment: int | None) -> str:
+    return "" if experiment is None else ROMAN[experiment - 1]
+
+
+def _settings() -> tuple[Setting, ...]:
+    settings = []
+    for (task, moves, left_out), (experiment, *paper) in PAPER.items():
+        number = 0 if task == "reacher" else 2 if moves else 1
+        prefix = ("reacher", "peg", "random_peg")[number]
+        settings.append(Setting(experiment, TASKS[number], prefix, left_out, (paper[0], paper[1])))
+    return tuple(settings)
+
+
+SETTINGS = _settings()
