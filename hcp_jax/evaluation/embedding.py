@@ -19,7 +19,7 @@ def knn_r2(embedding: np.ndarray, target: np.ndarray, neighbours: int = 5, folds
 
 
 def plot_embedding(embedding: np.ndarray, mass: np.ndarray, path: pathlib.Path) -> None:
-    """Scatter of a 2-D embedding [N, 2], coloured by mass [kg] [N]."""
+    """Scatter of a 2-D embedding [N, 2], coloured by mass [N] in kg."""
     figure = Figure(figsize=(6, 4.8), layout="constrained")
     axes = figure.subplots()
     points = axes.scatter(*embedding.T, c=mass, s=10, cmap="viridis")

@@ -146,7 +146,7 @@ def draw_box(axes: Axes, place: int, quantiles: Sequence[float], colour: str) ->
 
 
 def draw_embedding(embedding: np.ndarray, mass: np.ndarray) -> str:
-    """Scatter of a 2-D embedding [N, 2], coloured by mass [kg] [N]."""
+    """Scatter of a 2-D embedding [N, 2], coloured by mass [N] in kg."""
 
     def draw(axes: Axes) -> None:
         points = axes.scatter(*embedding.T, c=mass, s=8, cmap="viridis", linewidths=0)

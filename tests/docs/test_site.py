@@ -1,0 +1,109 @@
+"""The documentation: its generated pages, and that mkdocs builds it without a warning."""
+
+import dataclasses
+import importlib.util
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+from hcp_jax.config import Config, DDPGConfig, field_names
+from hcp_jax.presets import FAST_DDPG, arm, hopper
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def pages():
+    """docs/generated_pages.py, which is no part of the package."""
+    spec = importlib.util.spec_from_file_location("generated_pages", ROOT / "docs" / "generated_pages.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def rows(pages) -> dict[str, list[list[str]]]:
+    """Cells of the configuration page's rows, by their first one."""
+    lines = [line for line in pages.configuration_page().splitlines() if line.startswith("| `")]
+    found: dict[str, list[list[str]]] = {}
+    for line in lines:
+        cells = line.strip("| ").split(" | ")
+        found.setdefault(cells[0].strip("`"), []).append(cells)
+    return found
+
+
+def test_the_configuration_page_names_every_field_of_hopper_and_arm(rows):
+    expected = {*field_names(hopper("a", "none")), *field_names(arm("a", "reacher", "none"))}
+    assert not expected - rows.keys()
+    nested = {field.name for field in dataclasses.fields(Config)} | {"pool.ranges"}
+    assert not rows.keys() - expected - nested, "a field that no config has"
+
+
+def test_every_field_but_those_of_ranges_has_a_meaning(rows):
+    for name, found in rows.items():
+        for cells in found:
+            assert name.startswith("pool.ranges.") or (len(cells) == 4 and cells[3].strip()), name
+
+
+def test_a_row_holds_type_default_and_the_docstrings_text(rows):
+    assert rows["ddpg.buffer_episodes"][0] == [
+        "`ddpg.buffer_episodes`",
+        "`int`",
+        f"`{DDPGConfig().buffer_episodes}`",
+        "capacity of the replay buffer (paper: 1e6 steps, 5000 episodes of 200).",
+    ]
+    assert rows["ppo.gae_lambda"][0][3] == "discount and trace decay per control step."
+    assert rows["name"][0][2] == "required"
+    assert "up to 0.15 m above it" in rows["env.approach_starts"][0][3], "text that goes on in the next line"
+
+
+def test_presets_are_listed_where_they_differ(pages):
+    page = pages.configuration_page().partition("## Presets")[2]
+    assert f"| reacher | `ddpg.batch_size` | `{DDPGConfig().batch_size}` | `{FAST_DDPG.batch_size}` |" in page
+    assert "`ppo.num_epochs`" not in page, "the same in both"
+
+
+def test_a_field_without_text_is_seen(pages):
+    @dataclasses.dataclass(frozen=True)
+    class Sample:
+        """A sample.
+
+        Attributes:
+            first: one | two,
+                and three.
+        """
+
+        first: int = 1
+        second: float = 2.0
+
+    text, meanings = pages.read_attributes(Sample)
+    assert text == "A sample."
+    assert meanings == {"first": "one | two, and three."}
+
+
+def test_every_field_that_a_page_sets_exists():
+    known = {*field_names(hopper("a", "none")), *field_names(arm("a", "reacher", "none"))}
+    for page in (ROOT / "docs").glob("*.md"):
+        for name in re.findall(r"--config\.([\w.]+)=", page.read_text()):
+            assert name in known, f"{page.name}: --config.{name}"
+
+
+def test_every_module_that_a_page_runs_exists():
+    for page in (ROOT / "docs").glob("*.md"):
+        for name in re.findall(r"python\s-m (hcp_jax[\w.]*)", page.read_text()):
+            assert importlib.util.find_spec(name) is not None, f"{page.name}: python -m {name}"
+
+
+def test_the_site_builds_without_a_warning(tmp_path):
+    for name in ("mkdocs", "material", "mkdocstrings"):
+        pytest.importorskip(name, reason="the site needs the extra `docs`")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for page in ("", "configuration/", "api/hardware/", "your_robot/"):
+        assert (tmp_path / page / "index.html").exists()
+    assert "ddpg.critic_weight_decay" in (tmp_path / "configuration" / "index.html").read_text()
+    assert "make_hopper_pool" in (tmp_path / "api" / "hardware" / "index.html").read_text()
