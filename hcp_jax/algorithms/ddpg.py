@@ -82,6 +82,7 @@ class DDPGState:
     sums: dict[str, jax.Array]
 
 
+MIN_STD = 1e-6  # to which brax's running statistics are clipped from below
 FAILURE_STEP = 0.2  # of a robot's running mean of failures, per episode
 LOSS_METRICS = ("critic_loss", "actor_loss", "q")
 SUMS = (*LOSS_METRICS, "iterations", "updates", "episodes", "successes", "final_distance")
@@ -180,10 +181,11 @@ class DDPG:
         return self._act(params["actor"], self.normalize(inputs, statistics))
 
     def normalize(self, inputs: jax.Array, statistics: running_statistics.RunningStatisticsState) -> jax.Array:
-        """The inputs as the networks see them."""
+        """The inputs as the networks see them: 0 for those that never varied in training, of whatever arm this one is."""
         if not self.config.normalize_inputs:
             return inputs
-        return running_statistics.normalize(inputs, statistics, max_abs_value=5.0)
+        varied = statistics.std > MIN_STD
+        return jnp.where(varied, running_statistics.normalize(inputs, statistics, max_abs_value=5.0), 0.0)
 
     def _train(self, state: DDPGState, num_iterations: jax.Array) -> DDPGState:
         return jax.lax.fori_loop(0, num_iterations, lambda _, s: self._train_iteration(s), state)

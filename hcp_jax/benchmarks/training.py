@@ -129,6 +129,8 @@ def time_brax_ppo(config: Config, seconds: float) -> float:
     from brax import envs
     from brax.training.agents.ppo import train as ppo
 
+    # brax 0.14 calls this, which jax 0.10 has taken out.
+    jax.device_put_replicated = lambda tree, devices: jax.tree.map(lambda leaf: jnp.stack([leaf] * len(devices)), tree)
     per_iteration = _BRAX_NUM_ENVS * _BRAX_UNROLL
     speeds: list[float] = []
     ppo.train(

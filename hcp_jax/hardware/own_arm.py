@@ -60,6 +60,8 @@ def make_own_pool(task: str, robot: RobotFile) -> RobotPool:
         solution = solve_positions(repeated, points, jax.random.key(0), starts=np.clip(starts, *joint_range.T))
         better = (distance >= _MAX_ERROR) & (solution.distance < distance)
         distance[better], angles[better] = solution.distance[better], solution.angles[better]
+        if (distance < _MAX_ERROR).all():
+            break
     reached = distance < _MAX_ERROR
     if not reached.any():
         raise RobotFileError(f"reaches no point that the reacher starts from; it comes within {distance.min():.2f} m of one")

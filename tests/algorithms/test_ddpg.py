@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from brax.training.acme import running_statistics
 from goal_probes import PlaneEnv, PlaneInputs
 
 from hcp_jax.algorithms.ddpg import DDPG, DDPGState, draw_robots, mark_kernels, sum_rewards
@@ -175,6 +176,15 @@ def test_the_policy_is_a_running_mean_of_the_actors():
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, atol=1e-6), after.average_actor, expected)
     played, _ = make().policy(after)
     jax.tree.map(np.testing.assert_array_equal, played["actor"], after.average_actor)
+
+
+def test_an_input_that_never_varied_in_training_is_not_seen_by_the_networks():
+    learner = make(normalize_inputs=True)
+    inputs = jax.random.normal(jax.random.key(0), (500, learner.conditioning.size)).at[:, 0].set(0.3)
+    statistics = running_statistics.update(learner.init(jax.random.key(0)).statistics, inputs)
+    seen, of_another_robot = (learner.normalize(x, statistics) for x in (inputs, inputs.at[:, 0].set(0.4)))
+    np.testing.assert_array_equal(seen, of_another_robot)
+    np.testing.assert_allclose(seen[:, 1:].std(axis=0), 1.0, atol=0.1)
 
 
 def test_exploration_noise_is_correlated_from_step_to_step_as_asked():
