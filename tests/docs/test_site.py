@@ -117,7 +117,7 @@ def test_every_command_in_the_pages_is_one_that_its_parser_takes(monkeypatch):
     commands = commands_in_pages()
     assert len(commands) > 20
     for page, module, arguments in commands:
-        if arguments.split() != ["--help"]:
+        if not re.match(r"\s*(--help|[A-Z]+\b)", arguments):  # of which a page shows no more than its form
             with pytest.raises(Parsed) as parsed:
                 importlib.import_module(module).main(shlex.split(arguments))
             assert all(word.startswith("--config.") for word in parsed.value.args[0]), f"{page}: {module}{arguments}"
