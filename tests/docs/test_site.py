@@ -1,14 +1,17 @@
 """The documentation: its generated pages, and that mkdocs builds it without a warning."""
 
 import dataclasses
+import importlib
 import importlib.util
 import pathlib
 import re
+import shlex
 import subprocess
 import sys
 
 import pytest
 
+from hcp_jax import command_line
 from hcp_jax.config import Config, DDPGConfig, field_names
 from hcp_jax.presets import FAST_DDPG, arm, hopper
 
@@ -91,10 +94,33 @@ def test_every_field_that_a_page_sets_exists():
             assert name in known, f"{page.name}: --config.{name}"
 
 
-def test_every_module_that_a_page_runs_exists():
-    for page in (ROOT / "docs").glob("*.md"):
-        for name in re.findall(r"python\s-m (hcp_jax[\w.]*)", page.read_text()):
-            assert importlib.util.find_spec(name) is not None, f"{page.name}: python -m {name}"
+class Parsed(Exception):
+    """Raised in place of a command's work; its argument is what the parser left."""
+
+
+def commands_in_pages() -> list[tuple[str, str, str]]:
+    """(page, module, arguments) of every command of ours, in blocks and in running text."""
+    found = []
+    for page in sorted((ROOT / "docs").glob("*.md")):
+        text = page.read_text().replace("\\\n", " ")
+        found += [(page.name, *match) for match in re.findall(r"python -m (hcp_jax\.\w+)([^`#\n]*)", text)]
+    return found
+
+
+def test_every_command_in_the_pages_is_one_that_its_parser_takes(monkeypatch):
+    parse = command_line.OneLineParser.parse_known_args
+
+    def stop(parser, arguments=None, namespace=None):
+        raise Parsed(parse(parser, arguments, namespace)[1])
+
+    monkeypatch.setattr(command_line.OneLineParser, "parse_known_args", stop)
+    commands = commands_in_pages()
+    assert len(commands) > 20
+    for page, module, arguments in commands:
+        if not re.match(r"\s*(--help|[A-Z]+\b)", arguments):  # of which a page shows no more than its form
+            with pytest.raises(Parsed) as parsed:
+                importlib.import_module(module).main(shlex.split(arguments))
+            assert all(word.startswith("--config.") for word in parsed.value.args[0]), f"{page}: {module}{arguments}"
 
 
 def test_the_site_builds_without_a_warning(tmp_path):

@@ -34,12 +34,17 @@ EXPECTED = {
     "4_the_embedding": "heldout_fitted",
 }
 
+# CPU seconds of the four on a cold compilation cache: about 25, 40, 65, 40.
+SLOW = ("2_zero_shot_on_an_unseen_arm", "3_your_own_robot")
+
 
 def test_every_notebook_is_run():
     assert [path.stem for path in NOTEBOOKS] == list(EXPECTED)
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", [pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * (path.stem in SLOW)) for path in NOTEBOOKS]
+)
 def test_a_notebook_runs_from_top_to_bottom(path, tmp_path, monkeypatch):
     nbclient = pytest.importorskip("nbclient", reason=needs_jupyter)
     pytest.importorskip("ipykernel", reason=needs_jupyter)
@@ -47,6 +52,6 @@ def test_a_notebook_runs_from_top_to_bottom(path, tmp_path, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     notebook = read(path)
     nbclient.NotebookClient(
-        notebook, timeout=240, kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}}
+        notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}}
     ).execute()
     assert EXPECTED[path.stem] in printed(notebook)
