@@ -197,7 +197,7 @@ def test_ones_own_arm_keeps_the_names_of_its_joints(loaded):
 BAD_ROBOTS = {
     "K:0": "expected NUMBER after one of A:, B:, C:, D:, E:, F:, G:, H:, I:, train:",
     "train:8": "expected a number of at most 7",
-    "nowhere.urdf": "No such file",
+    "nowhere.urdf": "no such file",
 }
 
 
