@@ -177,7 +177,7 @@ BAD_ARGUMENTS = {
     "too many": (["--robots", *(f"H:{i}" for i in range(65)), "--out", "x.gif"], "65 of them: expected at most 64"),
     "format": (["--grid", "--out", "x.avi"], "--out=x.avi: expected a name that ends in .mp4, .gif, .png"),
     "pictures": (["--grid", "--out", "x.png", "--pictures", "0"], "--pictures=0: expected at least 1"),
-    "missing file": (["--robot", "nowhere.urdf", "--out", "x.gif"], "nowhere.urdf: No such file"),
+    "missing file": (["--robot", "nowhere.urdf", "--out", "x.gif"], "nowhere.urdf: no such file"),
 }
 
 
