@@ -157,10 +157,10 @@ def test_a_full_disk_ends_the_run_with_its_name_and_keeps_the_checkpoints_it_has
         pytest.skip("needs the right to mount a tmpfs")
     try:
         out, ballast = mount / "run", mount / "ballast"
-        process = start(experiment, out)
-        read_until(process, "held")
-        read_until(process, "held")
         with ballast.open("wb") as file:  # takes what is left
+            process = start(experiment, out)
+            read_until(process, "held")
+            read_until(process, "held")
             try:
                 while True:
                     file.write(b"0" * 4096)
