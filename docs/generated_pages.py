@@ -1,6 +1,6 @@
 """Pages of the site that are written by nobody: mkdocs runs this file as a hook.
 
-The home page is README.md, the configuration reference follows from the dataclasses in `hcp_jax/config.py`, and the figures and
+The home page is README.md, the configuration reference follows from the dataclasses in `hcp_jax/config/`, and the figures and
 tables under `results/` are published beside the pages that point to them.
 """
 
@@ -22,7 +22,7 @@ _CONTINUED = re.compile(r"        +(.*)")
 _INTRODUCTION = """# Configuration
 
 Every field of an experiment's config, with its type, its default and what its dataclass says of it. This page is generated
-from `hcp_jax/config.py` and `hcp_jax/hardware/ranges.py` whenever the site is built.
+from `hcp_jax/config/` and `hcp_jax/hardware/ranges.py` whenever the site is built.
 
 A field is set on the command line by its dotted path, for instance `--config.ppo.learning_rate=1e-4`; an unknown field, a
 value of another type and a value outside what is allowed end the command with one line and exit code 2. An experiment file

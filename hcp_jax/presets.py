@@ -71,9 +71,10 @@ FAST_DDPG = DDPGConfig(
     stop_at_success=True,
     actor_average=0.97,
 )
-# The peg: fewer and larger batches. Exploration that keeps its direction for some steps gets it to the hole, half of the goals stay the hole itself, and
-# those of hindsight are the states that came nearest to it. Arms that jam or hover over the hole are overrated by the critic:
-# five-step returns and more episodes of the arms that fail tell it. In the first half, being overrated is what makes it try.
+# The peg: fewer and larger batches. Exploration that keeps its direction for some steps gets it to the hole, half of the goals
+# stay the hole itself, and those of hindsight are the states that came nearest to it. Arms that jam or hover over the hole are
+# overrated by the critic: five-step returns and more episodes of the arms that fail tell it. In the first half, being overrated
+# is what makes it try.
 FAST_PEG_DDPG = dataclasses.replace(
     FAST_DDPG,
     actor_learning_rate=3e-4,

@@ -1,0 +1,26 @@
+"""Every setting, as frozen dataclasses that check themselves when built. This is where other packages import them from."""
+
+from hcp_jax.config.arm import ArmConfig, ArmPoolConfig
+from hcp_jax.config.checks import ConfigError
+from hcp_jax.config.conversion import field_names, from_dict, to_dict, unknown_field
+from hcp_jax.config.ddpg import DDPGConfig
+from hcp_jax.config.embedding import EmbeddingConfig
+from hcp_jax.config.hopper import HopperConfig, PoolConfig
+from hcp_jax.config.ppo import PPOConfig
+from hcp_jax.config.run import Config
+
+__all__ = [
+    "ArmConfig",
+    "ArmPoolConfig",
+    "Config",
+    "ConfigError",
+    "DDPGConfig",
+    "EmbeddingConfig",
+    "HopperConfig",
+    "PPOConfig",
+    "PoolConfig",
+    "field_names",
+    "from_dict",
+    "to_dict",
+    "unknown_field",
+]
