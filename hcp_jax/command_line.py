@@ -14,7 +14,7 @@ from absl import flags
 from ml_collections import ConfigDict, config_flags
 
 from hcp_jax.config import Config, ConfigError, field_names, from_dict, to_dict, unknown_field
-from hcp_jax.errors import UserError
+from hcp_jax.errors import UserError, one_line
 from hcp_jax.physics.base import PhysicsOverflowError
 from hcp_jax.training.loop import NonFiniteError
 
@@ -38,13 +38,13 @@ def user_errors_end_the_command() -> Iterator[None]:
     try:
         yield
     except UserError as error:
-        print(_one_line(error), file=sys.stderr)
+        print(one_line(error), file=sys.stderr)
         sys.exit(BAD_INPUT)
     except (PhysicsOverflowError, NonFiniteError) as error:
-        print(_one_line(error), file=sys.stderr)
+        print(one_line(error), file=sys.stderr)
         sys.exit(BROKEN)
     except OSError as error:
-        print(f"{_one_line(error)} (checkpoints that were finished before are kept)", file=sys.stderr)
+        print(f"{one_line(error)} (checkpoints that were finished before are kept)", file=sys.stderr)
         sys.exit(BROKEN)
 
 
@@ -104,11 +104,7 @@ def apply_overrides(config: Config, overrides: Sequence[str]) -> Config:
     try:
         rest = values(arguments)
     except (flags.Error, ValueError, TypeError, KeyError, AttributeError, SyntaxError) as error:
-        raise ConfigError(_one_line(error)) from error
+        raise ConfigError(one_line(error)) from error
     if len(rest) > 1:
         raise ConfigError(f"{rest[1]}: unexpected argument")
     return from_dict(Config, values.config.to_dict())
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())

@@ -9,9 +9,8 @@ from hcp_jax import command_line
 from hcp_jax.config import ConfigError
 from hcp_jax.evaluation.arm_sweeps import evaluate_arms
 from hcp_jax.evaluation.hopper_sweeps import evaluate_hoppers
-from hcp_jax.evaluation.new_robots import RangeChange
+from hcp_jax.evaluation.new_robots import RangeChange, check_types
 from hcp_jax.evaluation.statistics import write_json
-from hcp_jax.hardware.arm import TYPES
 from hcp_jax.hardware.catalogue import load_robot
 from hcp_jax.physics.base import INTEGRATORS, PHYSICS
 from hcp_jax.robot import OWN_ARM, add_chain_options
@@ -46,11 +45,9 @@ def main(arguments: list[str] | None = None) -> None:
         for name in ("trials", "robots_per_trial"):
             if getattr(options, name) < 1:
                 raise ConfigError(f"--{name.replace('_', '-')}={getattr(options, name)}: expected at least 1")
-        task = read_config(options.run).task
-        known = ("hopper",) if task == "hopper" else TYPES
-        for name in options.types or ():
-            if name not in known:
-                raise ConfigError(f"--types={name}: expected types out of {', '.join(known)}")
+        config = read_config(options.run)
+        task = config.task
+        check_types(config, options.types or ())
         if options.pool and options.range:
             raise ConfigError("--range: not with --pool, whose robots are drawn already")
         if options.robot and (task == "hopper" or options.types or options.pool or options.range):

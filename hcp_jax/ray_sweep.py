@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from hcp_jax.config import Config, to_dict
+from hcp_jax.errors import one_line
 
 LOCAL = "local"
 MAX_RETRIES = 3
@@ -40,8 +41,8 @@ def run_on_ray(jobs: Sequence[Job], run: Run, address: str, cpus_per_run: int) -
                 ray.get(done)
                 yield job, None
             except ray.exceptions.RayTaskError as error:
-                yield job, " ".join(str(error.cause).split())
+                yield job, one_line(error.cause)
             except ray.exceptions.RayError as error:
-                yield job, " ".join(str(error).split())
+                yield job, one_line(error)
     finally:
         ray.shutdown()

@@ -4,6 +4,7 @@ import pathlib
 
 from hcp_jax import command_line
 from hcp_jax.config import ConfigError
+from hcp_jax.experiment.chosen_robots import Choice, read_choice
 from hcp_jax.hardware.catalogue import load_robot
 from hcp_jax.physics.base import INTEGRATORS, PHYSICS
 from hcp_jax.rendering.film import MAX_ROBOTS, check_output, write_film
@@ -32,7 +33,7 @@ def main(arguments: list[str] | None = None) -> None:
     with command_line.user_errors_end_the_command():
         if options.pictures < 1:
             raise ConfigError(f"--pictures={options.pictures}: expected at least 1")
-        chosen = [read_choice(word) for word in options.robots or ()]
+        chosen = [read_robot(word) for word in options.robots or ()]
         if len(chosen) > MAX_ROBOTS:
             raise ConfigError(f"--robots: {len(chosen)} of them: expected at most {MAX_ROBOTS}")
         if options.robot and read_config(options.run).task == "hopper":
@@ -50,12 +51,12 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"wrote {options.out}")
 
 
-def read_choice(word: str) -> tuple[str, int]:
-    """A type and a row, from `H:3`."""
-    name, _, row = word.partition(":")
-    if not name or not row.isdecimal():
+def read_robot(word: str) -> Choice:
+    """A word of `--robots`. Raises ConfigError."""
+    choice = read_choice(word)
+    if choice is None:
         raise ConfigError(f"--robots={word}: expected TYPE:ROW, such as H:3")
-    return name, int(row)
+    return choice
 
 
 if __name__ == "__main__":

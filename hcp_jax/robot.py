@@ -10,15 +10,14 @@ from rich.table import Table
 
 from hcp_jax import command_line, presets
 from hcp_jax.evaluation.statistics import write_json
+from hcp_jax.experiment.arm import make_train_arms
 from hcp_jax.hardware.arm_encodings import encode_arms
-from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES, make_arm_pool
+from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES
 from hcp_jax.hardware.catalogue import catalogue_names, load_robot
 from hcp_jax.hardware.own_arm import compare_with, find_nearest, make_own_pool
 from hcp_jax.hardware.pool import RobotPool
-from hcp_jax.hardware.ranges import ArmRanges
 from hcp_jax.hardware.robot_file import RobotFile
 
-_ROBOTS_PER_TYPE = 140
 OWN_ARM = f"your arm, a URDF or MJCF file (see hcp_jax.robot check), or one of {', '.join(catalogue_names())}"
 
 
@@ -37,7 +36,7 @@ def main(arguments: list[str] | None = None) -> None:
     with command_line.user_errors_end_the_command():
         robot = load_robot(options.file, options.base, options.tip)
         own = make_own_pool(options.task, robot)
-        trained = make_arm_pool(options.task, ArmRanges(), presets.ARM_TYPES, _ROBOTS_PER_TYPE, seed=0)
+        trained = make_train_arms(presets.arm("trained", options.task, "none"))
         record = describe(robot, own, trained)
         print_record(record)
         if options.json:

@@ -9,12 +9,12 @@ import jax.export
 import numpy as np
 
 from hcp_jax.config import ArmConfig, Config, ConfigError
-from hcp_jax.deployment.chosen_robot import ChosenRobot, choose_robot
 from hcp_jax.deployment.robot_model import write_model
 from hcp_jax.deployment.robot_policy import RobotPolicy, make_robot_policy
 from hcp_jax.envs.arm import HOLE, REACHER_GOALS
 from hcp_jax.envs.hopper import INITIAL_HEIGHT
 from hcp_jax.experiment.build import make_experiment
+from hcp_jax.experiment.chosen_robots import ChosenRobot, choose_robot
 from hcp_jax.hardware.chain import TIP_SITE
 from hcp_jax.training import run_folder
 from hcp_jax.training.warm_start import load_policy

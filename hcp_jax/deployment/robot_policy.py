@@ -8,9 +8,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from hcp_jax.deployment.chosen_robot import ChosenRobot
 from hcp_jax.envs.hopper import MAX_OBSERVED_VELOCITY
 from hcp_jax.experiment.arm import ArmExperiment, make_goal_conditioning
+from hcp_jax.experiment.chosen_robots import ChosenRobot
 from hcp_jax.experiment.hopper import HopperExperiment, heldout_v_h, train_v_h
 from hcp_jax.hardware.chain import MAX_JOINTS
 

@@ -6,18 +6,19 @@ from collections.abc import Mapping, Sequence
 import jax
 import numpy as np
 
-from hcp_jax.config import ArmConfig, ArmPoolConfig, ConfigError
+from hcp_jax.algorithms.ddpg import DDPGState
+from hcp_jax.config import Config, ConfigError
 from hcp_jax.envs.goal_episodes import GoalEpisodes
-from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, load_pool
+from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, check_types, load_pool
 from hcp_jax.evaluation.records import QUANTILES
-from hcp_jax.experiment.arm import make_arm_experiment, make_evaluator, make_heldout_arms
-from hcp_jax.hardware.arm import OTHER_ARMS, TYPES, type_name
-from hcp_jax.hardware.catalogue import load_robot
+from hcp_jax.evaluation.statistics import describe_evaluation
+from hcp_jax.experiment.arm import ArmExperiment, load_own_robot, make_evaluator, make_heldout_arms
+from hcp_jax.experiment.build import make_experiment
+from hcp_jax.hardware.arm import TYPES, type_name
 from hcp_jax.hardware.inverse_kinematics import is_reachable
 from hcp_jax.hardware.own_arm import make_own_pool
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.robot_file import RobotFile
-from hcp_jax.physics.base import default_physics
 from hcp_jax.training import run_folder
 from hcp_jax.training.warm_start import load_policy
 
@@ -57,59 +58,66 @@ def evaluate_arms(
             be evaluated.
     """
     config = run_folder.read_config(folder)
-    pools, env_config = config.pool, config.env
-    assert isinstance(pools, ArmPoolConfig)
-    assert isinstance(env_config, ArmConfig)
-    own_name = pathlib.Path(config.robot).stem
-    if config.robot and not types and not pool_folder and not own_robots:
-        own_robots = {own_name: load_robot(config.robot, config.robot_base or None, config.robot_tip or None)}
-    if own_robots and ranges:
-        raise ConfigError("--range: not with an arm from a file, which is as it is")
-    if not types and not pool_folder and not own_robots:
-        types = tuple(dict.fromkeys((*pools.types, *pools.left_out)))
-    for name in types:
-        if config.task == "reacher" and name in OTHER_ARMS:
-            raise ConfigError(f"--types={name}: that arm holds a peg; it is of peg_insertion alone")
-    physics = physics if physics != "auto" else config.physics
-    run = make_arm_experiment(config, default_physics() if physics == "auto" else physics)
+    check_types(config, types)
+    run = make_experiment(config, physics)
+    assert isinstance(run, ArmExperiment)
     iteration, state = load_policy(folder, run, best)
-    count, upright = trials * robots_per_trial, config.task == "peg_insertion"
-    if own_robots:
-        pools_by_type = {name: make_own_pool(config.task, robot) for name, robot in own_robots.items()}
-    elif pool_folder:
-        pools_by_type = split_types(load_pool(pool_folder, run.train_pool), types)
-    else:
-        drawn = change_ranges(config, ranges)
-        pools_by_type = {name: make_heldout_arms(drawn, (name,), count) for name in types}
-    record = {
-        "run": str(folder),
-        "task": config.task,
-        "algorithm": config.algorithm,
-        "encoding": config.encoding,
-        "physics": run.physics,
-        "integrator": run.physics.partition("-")[2] if run.physics.startswith("native-") else env_config.integrator,
-        "checkpoint_env_steps": iteration * config.batch_size,
-        "commit": run_folder.read_commit(),
-        "trials": trials,
-        "robots_per_trial": robots_per_trial,
-        "ranges": {name: [low, high] for name, low, high in ranges},
-        "pool": str(pool_folder) if pool_folder else None,
-        "types": {},
-        "robots": [],
-    }
-    for name, pool in pools_by_type.items():
-        evaluator = make_evaluator(config, run.learner, run.make_env, pool, run.train_pool)
-        number = TYPES.index(name) if name in TYPES else len(TYPES)
-        key_play, key_goal = jax.random.split(jax.random.fold_in(jax.random.key(seed), number))
-        index = np.arange(count) % pool.num_robots
-        episodes = evaluator(run.learner.policy(state), index, key_play)
-        goals = np.asarray(episodes.desired_goal)
-        reachable = is_reachable(pool.subset(index), goals, env_config.success_distance, key_goal, upright)
-        stuck = immovable_joints(pool)[index].any(axis=1)
-        zero_shot = name not in pools.types and name != own_name
-        record["types"][name] = {"zero_shot": zero_shot} | summarise_type(episodes, reachable, stuck, trials)
-        record["robots"] += [{"type": name} | row for row in robot_rows(pool, episodes, reachable)]
+    record = describe_evaluation(run, folder, iteration, trials, robots_per_trial, ranges, pool_folder)
+    record |= {"types": {}, "robots": []}
+    pools = choose_pools(run, trials * robots_per_trial, types, ranges, pool_folder, own_robots or {})
+    for name, pool in pools.items():
+        zero_shot = name not in run.pool_config.types and name != own_robot_name(config)
+        summary, rows = evaluate_type(run, state, name, pool, trials, robots_per_trial, seed)
+        record["types"][name] = {"zero_shot": zero_shot} | summary
+        record["robots"] += [{"type": name} | row for row in rows]
     return record
+
+
+def choose_pools(
+    run: ArmExperiment,
+    count: int,
+    types: Sequence[str],
+    ranges: Sequence[RangeChange],
+    pool_folder: pathlib.Path | None,
+    own_robots: Mapping[str, RobotFile],
+) -> dict[str, RobotPool]:
+    """The robots to evaluate, by type: arms from files, those of a saved pool, or held-out robots 0..count-1.
+
+    Arguments as of `evaluate_arms`. Raises ConfigError, PoolError or RobotFileError.
+    """
+    config = run.config
+    if config.robot and not (types or pool_folder or own_robots):
+        own_robots = {own_robot_name(config): load_own_robot(config)}
+    if own_robots:
+        if ranges:
+            raise ConfigError("--range: not with an arm from a file, which is as it is")
+        return {name: make_own_pool(config.task, robot) for name, robot in own_robots.items()}
+    if pool_folder:
+        return split_types(load_pool(pool_folder, run.train_pool), types)
+    drawn = change_ranges(config, ranges)
+    types = types or tuple(dict.fromkeys((*run.pool_config.types, *run.pool_config.left_out)))
+    return {name: make_heldout_arms(drawn, (name,), count) for name in types}
+
+
+def own_robot_name(config: Config) -> str:
+    """What records call the arm from a file that a run was trained on; empty without one."""
+    return pathlib.Path(config.robot).stem
+
+
+def evaluate_type(
+    run: ArmExperiment, state: DDPGState, name: str, pool: RobotPool, trials: int, robots_per_trial: int, seed: int
+) -> tuple[dict, list[dict]]:
+    """One episode of each robot of `pool` in order, all of them before any twice: their summary, and a row for each."""
+    config = run.config
+    evaluator = make_evaluator(config, run.learner, run.make_env, pool, run.train_pool)
+    number = TYPES.index(name) if name in TYPES else len(TYPES)
+    key_play, key_goal = jax.random.split(jax.random.fold_in(jax.random.key(seed), number))
+    index = np.arange(trials * robots_per_trial) % pool.num_robots
+    episodes = evaluator(run.learner.policy(state), index, key_play)
+    goals, within = np.asarray(episodes.desired_goal), config.env.success_distance
+    reachable = is_reachable(pool.subset(index), goals, within, key_goal, config.task == "peg_insertion")
+    stuck = immovable_joints(pool)[index].any(axis=1)
+    return summarise_type(episodes, reachable, stuck, trials), robot_rows(pool, episodes, reachable)
 
 
 def split_types(pool: RobotPool, types: Sequence[str]) -> dict[str, RobotPool]:

@@ -10,7 +10,7 @@ from hcp_jax.algorithms.ppo import PPOState
 from hcp_jax.config import PoolConfig
 from hcp_jax.envs.episodes import Episodes
 from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, load_pool
-from hcp_jax.evaluation.statistics import robot_rows, summarise_trials
+from hcp_jax.evaluation.statistics import describe_evaluation, robot_rows, summarise_trials
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.experiment.hopper import (
     EmbeddingFitter,
@@ -59,11 +59,32 @@ def evaluate_hoppers(
     Raises:
         RunFolderError, CheckpointError, ConfigError, PoolError: the folder or the pool cannot be evaluated.
     """
-    config = run_folder.read_config(folder)
-    run = make_experiment(config, physics)
+    run = make_experiment(run_folder.read_config(folder), physics)
     assert isinstance(run, HopperExperiment)
     iteration, state = load_policy(folder, run, best)
-    count = trials * robots_per_trial
+    record = describe_evaluation(run, folder, iteration, trials, robots_per_trial, ranges, pool_folder)
+    record |= {"types": {}, "sets": {}, "robots": []}
+    sets = choose_sets(run, state, trials * robots_per_trial, fit_steps, ranges, pool_folder)
+    for name, (pool, rows, v_h) in sets.items():
+        episodes = play_trials(run, state, pool, rows, v_h, trials, jax.random.key(seed))
+        record["sets"][name] = summarise_trials(episodes)
+        record["robots"] += [{"set": name} | row for row in robot_rows(pool, episodes)]
+    shown = record["sets"]["heldout"]
+    record["types"][run.config.task] = {"zero_shot": True} | shown
+    record["return_mean"], record["return_std"] = shown["return_mean"], shown["return_std"]
+    return record
+
+
+def choose_sets(
+    run: HopperExperiment,
+    state: PPOState,
+    count: int,
+    fit_steps: int | None,
+    ranges: Sequence[RangeChange],
+    pool_folder: pathlib.Path | None,
+) -> dict[str, tuple[RobotPool, np.ndarray, jax.Array]]:
+    """The record's sets of robots: a pool, rows [count] of it, and their v_h [count, K]. Arguments as of `evaluate_hoppers`."""
+    config = run.config
     drawn = change_ranges(config, ranges).pool
     assert isinstance(drawn, PoolConfig)
     heldout = load_pool(pool_folder, run.train_pool) if pool_folder else make_heldout_pool(drawn, count)
@@ -74,31 +95,7 @@ def evaluate_hoppers(
     if run.ppo.conditioning.is_learned and fit_steps:
         print(f"fitting v_h of {heldout.num_robots} new robots, {fit_steps:,} control steps each, networks frozen", flush=True)
         sets["heldout_fitted"] = (heldout, new, EmbeddingFitter(run, heldout, fit_steps)(state)[new])
-    record = {
-        "run": str(folder),
-        "task": config.task,
-        "algorithm": config.algorithm,
-        "encoding": config.encoding,
-        "physics": run.physics,
-        "integrator": run.physics.partition("-")[2] if run.physics.startswith("native-") else config.env.integrator,
-        "checkpoint_env_steps": iteration * config.batch_size,
-        "commit": run_folder.read_commit(),
-        "trials": trials,
-        "robots_per_trial": robots_per_trial,
-        "ranges": {name: [low, high] for name, low, high in ranges},
-        "pool": str(pool_folder) if pool_folder else None,
-        "types": {},
-        "sets": {},
-        "robots": [],
-    }
-    for name, (pool, rows, v_h) in sets.items():
-        episodes = play_trials(run, state, pool, rows, v_h, trials, jax.random.key(seed))
-        record["sets"][name] = summarise_trials(episodes)
-        record["robots"] += [{"set": name} | row for row in robot_rows(pool, episodes)]
-    shown = record["sets"]["heldout"]
-    record["types"][config.task] = {"zero_shot": True} | shown
-    record["return_mean"], record["return_std"] = shown["return_mean"], shown["return_std"]
-    return record
+    return sets
 
 
 def play_trials(

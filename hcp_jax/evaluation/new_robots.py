@@ -4,9 +4,18 @@ import pathlib
 from collections.abc import Sequence
 
 from hcp_jax.config import Config, ConfigError, from_dict, to_dict, unknown_field
+from hcp_jax.experiment.chosen_robots import heldout_kinds
 from hcp_jax.hardware.pool import RobotPool
 
 RangeChange = tuple[str, float, float]  # name, low, high
+
+
+def check_types(config: Config, types: Sequence[str]) -> None:
+    """Raises ConfigError for a type that the run's task has not."""
+    known = heldout_kinds(config)
+    for name in types:
+        if name not in known:
+            raise ConfigError(f"--types={name}: expected types out of {', '.join(known)}")
 
 
 def change_ranges(config: Config, changes: Sequence[RangeChange]) -> Config:

@@ -11,12 +11,12 @@ import mujoco
 import numpy as np
 
 from hcp_jax.config import ArmConfig, ConfigError
-from hcp_jax.deployment.chosen_robot import ChosenRobot, choose_robot
 from hcp_jax.deployment.robot_model import arm_model
 from hcp_jax.deployment.robot_policy import make_robot_policy
 from hcp_jax.envs.arm import CTRL_DT, REACHER_GOALS
-from hcp_jax.evaluation.arm_sweeps import QUANTILES
+from hcp_jax.evaluation.records import QUANTILES
 from hcp_jax.experiment.build import make_experiment
+from hcp_jax.experiment.chosen_robots import ChosenRobot, choose_robot
 from hcp_jax.hardware.chain import TIP_SITE
 from hcp_jax.training import run_folder
 from hcp_jax.training.warm_start import load_policy
@@ -64,7 +64,7 @@ def rehearse(
 
     Args:
         folder: a run folder, or a published policy, of the reacher.
-        robot_name, base, tip: the arm (`hcp_jax.deployment.chosen_robot.choose_robot`).
+        robot_name, base, tip: the arm (`hcp_jax.experiment.chosen_robots.choose_robot`).
         num_goals: drawn uniformly from the task's box, reachable or not, each with a start pose.
         seed: of goals, start poses, noise and jitter.
 

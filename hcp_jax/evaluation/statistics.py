@@ -1,4 +1,4 @@
-"""What an evaluation says: statistics over trials, per robot type and per robot."""
+"""What an evaluation says: of what it is, statistics over trials, and a row per robot."""
 
 import json
 import pathlib
@@ -8,10 +8,41 @@ from collections.abc import Sequence
 import numpy as np
 
 from hcp_jax.envs.episodes import Episodes
+from hcp_jax.evaluation.new_robots import RangeChange
+from hcp_jax.experiment.base import Experiment
 from hcp_jax.hardware.pool import RobotPool
+from hcp_jax.physics.base import chosen_integrator
+from hcp_jax.training import run_folder
 
 # A list of numbers that json.dumps spreads over lines. Texts hold no line breaks in JSON, so it is no part of one.
 _NUMBERS = re.compile(r"\[\n([-+\d.eE,\s]+)\]")
+
+
+def describe_evaluation(
+    run: Experiment,
+    folder: pathlib.Path,
+    iteration: int,
+    trials: int,
+    robots_per_trial: int,
+    ranges: Sequence[RangeChange],
+    pool_folder: pathlib.Path | None,
+) -> dict:
+    """What every record of an evaluation starts with: the policy of `folder` after `iteration` iterations, and its robots."""
+    config = run.config
+    return {
+        "run": str(folder),
+        "task": config.task,
+        "algorithm": config.algorithm,
+        "encoding": config.encoding,
+        "physics": run.physics,
+        "integrator": chosen_integrator(run.physics, config.env.integrator),
+        "checkpoint_env_steps": iteration * config.batch_size,
+        "commit": run_folder.read_commit(),
+        "trials": trials,
+        "robots_per_trial": robots_per_trial,
+        "ranges": {name: [low, high] for name, low, high in ranges},
+        "pool": str(pool_folder) if pool_folder else None,
+    }
 
 
 def summarise_trials(trials: Sequence[Episodes]) -> dict[str, float]:

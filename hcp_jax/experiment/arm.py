@@ -23,7 +23,8 @@ from hcp_jax.hardware.arm_pool import make_arm_pool
 from hcp_jax.hardware.catalogue import load_robot
 from hcp_jax.hardware.own_arm import make_own_pool, make_own_variants
 from hcp_jax.hardware.pool import RobotPool
-from hcp_jax.physics.base import make_physics
+from hcp_jax.hardware.robot_file import RobotFile
+from hcp_jax.physics.base import chosen_integrator, make_physics
 from hcp_jax.policies.conditioning import Embedding
 from hcp_jax.policies.goal_conditioning import GoalConditioning
 
@@ -111,13 +112,13 @@ def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:
     if config.robot:
         train_pool, heldout_pool = make_own_pools(config)
     else:
-        train_pool = make_arm_pool(config.task, pools.ranges, pools.types, pools.robots_per_type, pools.seed, pools.split)
+        train_pool = make_train_arms(config)
         types = tuple(dict.fromkeys((*pools.types, *pools.left_out)))
         heldout_pool = make_heldout_arms(config, types, pools.heldout_per_type)
     task = ArmTask(config.task, **dataclasses.asdict(env_config))
 
     def make_env(pool: RobotPool, engine: str = physics, approach_starts: float = 0.0) -> GoalEnv:
-        integrator = engine.removeprefix("native-") if engine.startswith("native-") else env_config.integrator
+        integrator = chosen_integrator(engine, env_config.integrator)
         stepped = dataclasses.replace(task, integrator=integrator, approach_starts=approach_starts)
         return GoalEnv(stepped, pool, make_physics(engine, pool, stepped.sim_dt, integrator))
 
@@ -149,6 +150,13 @@ def check_memory(config: Config, num_bytes: int) -> None:
         )
 
 
+def make_train_arms(config: Config) -> RobotPool:
+    """The arms that are trained on, `pool.robots_per_type` of each of `pool.types`."""
+    pools = config.pool
+    assert isinstance(pools, ArmPoolConfig)
+    return make_arm_pool(config.task, pools.ranges, pools.types, pools.robots_per_type, pools.seed, pools.split)
+
+
 def make_heldout_arms(config: Config, types: tuple[str, ...], num_per_type: int) -> RobotPool:
     """Held-out robots 0..num_per_type-1 of each of `types`: no training pool of this seed contains them."""
     pools = config.pool
@@ -156,11 +164,16 @@ def make_heldout_arms(config: Config, types: tuple[str, ...], num_per_type: int)
     return make_arm_pool(config.task, pools.ranges, types, num_per_type, pools.seed, "heldout")
 
 
+def load_own_robot(config: Config) -> RobotFile:
+    """The arm that `config.robot` names. Raises RobotFileError."""
+    return load_robot(config.robot, config.robot_base or None, config.robot_tip or None)
+
+
 def make_own_pools(config: Config) -> tuple[RobotPool, RobotPool]:
     """What is trained on and what is evaluated where `config.robot` names an arm. Raises RobotFileError."""
     pools = config.pool
     assert isinstance(pools, ArmPoolConfig)
-    robot = load_robot(config.robot, config.robot_base or None, config.robot_tip or None)
+    robot = load_own_robot(config)
     own = make_own_pool(config.task, robot)
     count = pools.heldout_per_type
     heldout = own.subset(np.zeros(count, int)).replace(robot_id=own.robot_id + np.arange(count, dtype=np.int32))

@@ -16,7 +16,7 @@ from xml.parsers import expat
 import mujoco
 import numpy as np
 
-from hcp_jax.errors import UserError
+from hcp_jax.errors import UserError, one_line
 from hcp_jax.hardware.chain import MAX_JOINTS, Chain, ChainError, read_chain
 
 MAX_BYTES = 20_000_000
@@ -327,10 +327,6 @@ def relative_to(chain: Chain, model: mujoco.MjModel, base: str) -> Chain:
     return dataclasses.replace(
         chain, pos=np.concatenate([position[None], chain.pos[1:]]), quat=np.concatenate([quat[None], chain.quat[1:]])
     )
-
-
-def one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())
 
 
 def main() -> None:

@@ -66,6 +66,11 @@ def default_physics() -> str:
     return "mjx-jax"
 
 
+def chosen_integrator(name: str, integrator: str) -> str:
+    """The integrator that an engine's name `native-INTEGRATOR` overrules `integrator` with."""
+    return name.removeprefix("native-") if name.startswith("native-") else integrator
+
+
 def make_physics(name: str, pool: RobotPool, sim_dt: float, integrator: str) -> Physics:
     """Builds the engine `name` for the robots of `pool`.
 
@@ -80,11 +85,10 @@ def make_physics(name: str, pool: RobotPool, sim_dt: float, integrator: str) -> 
     """
     if name == "auto":
         name = default_physics()
-    if name.startswith("native-"):
-        name, integrator = "native", name.removeprefix("native-")
+    integrator = chosen_integrator(name, integrator)
     if integrator not in INTEGRATORS:
         raise ValueError(f"integrator={integrator!r}: expected one of {', '.join(INTEGRATORS)}")
-    if name == "native":
+    if name == "native" or name.startswith("native-"):
         from hcp_jax.physics import native
 
         return native.NativePhysics(pool, sim_dt, integrator)

@@ -12,11 +12,11 @@ from hcp_jax.config import ArmConfig, ArmPoolConfig, ConfigError
 from hcp_jax.envs.arm import CTRL_DT
 from hcp_jax.experiment.arm import ArmExperiment
 from hcp_jax.experiment.build import make_experiment
+from hcp_jax.experiment.chosen_robots import heldout_kinds
 from hcp_jax.hardware.arm import LINKS
 from hcp_jax.rendering.drawing import ARM_FLOOR, GOAL_GEOMS, OPEN_GOAL, REACHED_GOAL, make_drawing, put_goal
 from hcp_jax.rendering.graphics import GraphicsError
 from hcp_jax.rendering.live import LiveArm
-from hcp_jax.rendering.recording import default_robots
 from hcp_jax.training import run_folder
 from hcp_jax.training.warm_start import load_policy
 
@@ -69,7 +69,7 @@ class ArmView:
         self._within = run.config.env.success_distance
         self._rebuild_at, self._asks_pose, self._asked_goal = math.inf, False, None
         self.shapes, self._num_ticks = {}, 0
-        self._add_controls([name for name, _ in default_robots(run.config)], run.config.pool)
+        self._add_controls(heldout_kinds(run.config), run.config.pool)
         self._rebuild()
         self.gizmo = server.scene.add_transform_controls(
             "/goal", scale=0.15, disable_rotations=True, disable_sliders=True, position=self.arm.goal
@@ -107,7 +107,7 @@ class ArmView:
         """Moves the goal to `goal` [3] m with the next tick."""
         self._asked_goal = goal
 
-    def _add_controls(self, types: list[str], pool_config: ArmPoolConfig) -> None:
+    def _add_controls(self, types: tuple[str, ...], pool_config: ArmPoolConfig) -> None:
         gui = self.server.gui
         self.robot_type = gui.add_dropdown("arm type", types)
         self.robot_type.on_update(lambda _: self._ask_robot(0.0))

@@ -8,21 +8,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from hcp_jax.config import ArmPoolConfig, Config, ConfigError, PoolConfig
-from hcp_jax.experiment.arm import ArmExperiment, make_evaluator, make_heldout_arms
+from hcp_jax.config import ArmPoolConfig, Config, ConfigError
+from hcp_jax.experiment.arm import ArmExperiment, make_evaluator
 from hcp_jax.experiment.build import make_experiment
-from hcp_jax.experiment.hopper import HopperExperiment, heldout_v_h, make_heldout_pool, train_v_h
+from hcp_jax.experiment.chosen_robots import TRAINED, Choice, check_choice, heldout_kinds, make_chosen_pool
+from hcp_jax.experiment.hopper import HopperExperiment, heldout_v_h, train_v_h
 from hcp_jax.experiment.hopper import make_evaluator as make_hopper_evaluator
-from hcp_jax.hardware.arm import OTHER_ARMS, TYPES
-from hcp_jax.hardware.arm_pool import TYPE_STRIDE
 from hcp_jax.hardware.own_arm import make_own_pool
-from hcp_jax.hardware.pool import RobotPool, concatenate_pools
+from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.robot_file import RobotFile
 from hcp_jax.training import run_folder
 from hcp_jax.training.warm_start import load_policy
 
-Choice = tuple[str, int]  # a type and a row in it
-HOPPER_SETS = ("hopper", "train")  # held-out hoppers, and those trained on
 _NUM_HOPPERS = 9  # in a grid
 
 
@@ -63,8 +60,8 @@ def record_episodes(
 
     Args:
         folder: a run folder, or one of a published policy.
-        robots: types and rows. Arms: row ROW of the held-out robots of a type. Hoppers: of `hopper`, the held-out ones, which
-            get the mean embedding where v_h is learned, or of `train`. By default one robot of every type, or nine hoppers.
+        robots: held-out ones, which get the mean embedding where v_h is learned; hoppers also of `train`. By default one robot
+            of every type, or nine hoppers.
         own_robot: one arm with its name, instead of `robots`.
         physics: engine, may be `native-INTEGRATOR`; `auto` takes the run's.
         seed: of start poses, goals and noise.
@@ -78,7 +75,7 @@ def record_episodes(
     if not own_robot:
         robots = robots or default_robots(config)
         check_robots(config, robots)
-    run = make_experiment(config, None if physics == "auto" else physics)
+    run = make_experiment(config, physics)
     state = load_policy(folder, run, best)[1]
     key = jax.random.key(seed)
     if isinstance(run, HopperExperiment):
@@ -86,41 +83,27 @@ def record_episodes(
     assert isinstance(run, ArmExperiment)
     if own_robot:
         return record_arms(run, state, make_own_pool(config.task, own_robot[1]), [own_robot[0]], key)
-    pool = choose_robots(robots, lambda name, count: make_heldout_arms(config, (name,), count))
-    return record_arms(run, state, pool, [label(config, *robot) for robot in robots], key)
+    return record_arms(run, state, make_chosen_pool(run, robots), [label(config, robot) for robot in robots], key)
 
 
 def default_robots(config: Config) -> list[Choice]:
     """The first held-out robot of every type that the task has; of hoppers the first nine."""
-    if config.task == "hopper":
-        return [("hopper", row) for row in range(_NUM_HOPPERS)]
-    return [(name, 0) for name in TYPES if config.task == "peg_insertion" or name not in OTHER_ARMS]
+    rows = range(_NUM_HOPPERS if config.task == "hopper" else 1)
+    return [Choice(kind, row) for kind in heldout_kinds(config) for row in rows]
 
 
 def check_robots(config: Config, robots: Sequence[Choice]) -> None:
     """Raises ConfigError for a type that the task has not, a row out of range, or a robot that is named twice."""
-    allowed = HOPPER_SETS if config.task == "hopper" else dict.fromkeys(name for name, _ in default_robots(config))
-    assert isinstance(config.pool, (PoolConfig, ArmPoolConfig))
-    for name, row in robots:
-        if name not in allowed:
-            raise ConfigError(f"--robots={name}:{row}: expected types out of {', '.join(allowed)} for {config.task}")
-        count = config.pool.num_robots if name == "train" else TYPE_STRIDE
-        if not 0 <= row < count:
-            raise ConfigError(f"--robots={name}:{row}: expected a row from 0 to {count - 1}")
-        if list(robots).count((name, row)) > 1:
-            raise ConfigError(f"--robots={name}:{row}: named twice")
+    kinds = (*heldout_kinds(config), *((TRAINED,) if config.task == "hopper" else ()))
+    for robot in robots:
+        check_choice(config, robot, kinds, "--robots")
+        if list(robots).count(robot) > 1:
+            raise ConfigError(f"--robots={robot}: named twice")
 
 
-def choose_robots(robots: Sequence[Choice], make_pool) -> RobotPool:
-    """One pool of `robots`, in that order; `make_pool(type, count)` makes the first robots of a type."""
-    counts = {name: 1 + max(row for other, row in robots if other == name) for name, _ in robots}
-    pools = {name: make_pool(name, count) for name, count in counts.items()}
-    return concatenate_pools(*(pools[name].subset([row]) for name, row in robots))
-
-
-def label(config: Config, name: str, row: int) -> str:
+def label(config: Config, robot: Choice) -> str:
     assert isinstance(config.pool, ArmPoolConfig)
-    return f"{name}:{row}" if name in config.pool.types else f"{name}:{row} (zero-shot)"
+    return str(robot) if robot.kind in config.pool.types else f"{robot} (zero-shot)"
 
 
 def record_arms(run: ArmExperiment, state, pool: RobotPool, names: Sequence[str], key: jax.Array) -> Recording:
@@ -150,11 +133,9 @@ def arm_outcome(success: bool, diverged: bool, seconds: float, distance: float) 
 
 def record_hoppers(run: HopperExperiment, state, robots: Sequence[Choice], key: jax.Array) -> Recording:
     """One episode of each hopper; it ends at the task's limits of height, pitch and time."""
-    config = run.config.pool
-    assert isinstance(config, PoolConfig)
-    pool = choose_robots(robots, lambda name, count: make_heldout_pool(config, count) if name == "hopper" else run.train_pool)
+    pool = make_chosen_pool(run, robots)
     new, known = heldout_v_h(run, state.params, pool), train_v_h(run, state.params)
-    v_h = jnp.stack([new[i] if name == "hopper" else known[row] for i, (name, row) in enumerate(robots)])
+    v_h = jnp.stack([known[robot.row] if robot.kind == TRAINED else new[i] for i, robot in enumerate(robots)])
     evaluator = make_hopper_evaluator(run.ppo, run.make_env(pool))
     params = (state.params["network"], state.obs_statistics)
     episodes, states = evaluator.record(params, run.ppo.visible(state, v_h), np.arange(len(robots)), key)
@@ -167,7 +148,7 @@ def record_hoppers(run: HopperExperiment, state, robots: Sequence[Choice], key: 
     ]
     return Recording(
         pool=pool,
-        names=tuple(f"{name}:{row}" for name, row in robots),
+        names=tuple(map(str, robots)),
         outcomes=tuple(outcomes),
         qpos=states.qpos,
         goal=None,

@@ -8,7 +8,7 @@ import jax
 import orbax.checkpoint as ocp
 from absl import logging as absl_logging
 
-from hcp_jax.errors import UserError
+from hcp_jax.errors import UserError, one_line
 from hcp_jax.experiment.base import TrainingState
 
 
@@ -83,7 +83,7 @@ class Checkpoints:
             except CheckpointError:
                 raise
             except Exception as error:  # orbax and tensorstore raise many kinds for damaged files
-                reason = " ".join(str(error).split())[:160] or type(error).__name__
+                reason = one_line(error)[:160] or type(error).__name__
                 skipped.append(f"checkpoint {iteration} cannot be read and is passed over ({reason})")
                 self._move_aside(iteration)
         raise CheckpointError(f"{self.folder}: no readable checkpoint; {skipped[0]}")

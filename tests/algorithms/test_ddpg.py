@@ -161,11 +161,21 @@ def test_a_robots_failures_are_averaged_over_its_episodes():
     np.testing.assert_allclose(state.failure, expected, atol=1e-6)
 
 
-def test_two_critics_value_a_step_no_higher_than_one():
-    single, double = trained(make()), trained(make(double_critic=True))
-    assert jax.tree.leaves(double.params["critic"])[0].shape[0] == 2
-    inputs, action = jnp.zeros((1, 4)), jnp.zeros((1, 2))
-    assert make()._values(single.params["critic"], inputs, action).shape == (1, 1)
+def test_the_target_takes_the_smaller_value_of_two_critics():
+    learner = make(double_critic=True, warmup_episodes=1000)
+    state = trained(learner, 2)
+    sample = sample_steps(state.replay, jax.random.key(1), 64)
+
+    def loss(*values: float) -> float:
+        """The critics' loss where the target's are these numbers, whatever they see."""
+        critic = jax.tree.map(jnp.zeros_like, state.target_params["critic"])
+        critic["params"]["output"]["bias"] = jnp.asarray(values)[:, None]
+        target, missed = state.target_params | {"critic": critic}, sample.achieved_goal[:, 0] + 9.0
+        _, metrics = learner._loss(state.params, target, state.statistics, sample, missed)
+        return float(metrics["critic_loss"])
+
+    assert loss(-1.0, 5.0) == loss(5.0, -1.0) == loss(-1.0, -1.0)
+    assert abs(loss(-1.0, 5.0) - loss(5.0, 5.0)) > 1.0
 
 
 def test_the_policy_is_a_running_mean_of_the_actors():

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from hcp_jax import export
-from hcp_jax.deployment.chosen_robot import ChosenRobot, choose_robot
 from hcp_jax.deployment.robot_model import write_model
 from hcp_jax.experiment.arm import make_evaluator, make_goal_conditioning, make_heldout_arms
 from hcp_jax.experiment.build import make_experiment
+from hcp_jax.experiment.chosen_robots import ChosenRobot, choose_robot
 from hcp_jax.experiment.hopper import heldout_v_h, make_heldout_pool
 from hcp_jax.hardware.arm_pool import make_arm_pool
 from hcp_jax.hardware.pool import robots_path
@@ -195,8 +195,8 @@ def test_ones_own_arm_keeps_the_names_of_its_joints(loaded):
 
 
 BAD_ROBOTS = {
-    "K:0": "expected NUMBER after one of A:, B:, C:, D:, E:, F:, G:, H:, I:, train:",
-    "train:8": "expected a number of at most 7",
+    "K:0": "--robot=K:0: expected types out of A, B, C, D, E, F, G, H, I, train for reacher",
+    "train:8": "--robot=train:8: expected a row from 0 to 7",
     "nowhere.urdf": "no such file",
 }
 

@@ -7,8 +7,8 @@ import pytest
 
 from hcp_jax import rehearse
 from hcp_jax.config import ArmConfig
-from hcp_jax.deployment.chosen_robot import ChosenRobot
 from hcp_jax.evaluation.rehearsal import IDEAL, REAL, Conditions, make_model, play
+from hcp_jax.experiment.chosen_robots import ChosenRobot
 from hcp_jax.hardware.arm_pool import make_arm_pool
 from hcp_jax.hardware.ranges import ArmRanges
 

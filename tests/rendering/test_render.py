@@ -12,6 +12,7 @@ from PIL import Image
 
 from hcp_jax import render
 from hcp_jax.experiment.build import make_experiment
+from hcp_jax.experiment.chosen_robots import Choice
 from hcp_jax.hardware.pool import robots_path
 from hcp_jax.rendering import film, graphics
 from hcp_jax.rendering.drawing import OPEN_GOAL
@@ -31,7 +32,7 @@ def backend() -> str:
 
 @pytest.fixture(scope="module")
 def recording(finished_arms) -> Recording:
-    return record_episodes(finished_arms, [("H", 1), ("A", 0)])
+    return record_episodes(finished_arms, [Choice("H", 1), Choice("A", 0)])
 
 
 def fails(capsys, arguments) -> str:
@@ -77,7 +78,7 @@ def test_an_arms_states_end_as_far_from_the_goal_as_its_outcome_says(recording):
 
 
 def test_a_hoppers_states_earn_what_its_outcome_says(finished_run):
-    recording = record_episodes(finished_run, [("hopper", 2), ("train", 5), ("hopper", 0)])
+    recording = record_episodes(finished_run, [Choice("hopper", 2), Choice("train", 5), Choice("hopper", 0)])
     assert recording.pool.robot_id.tolist() == [1_000_002, 5, 1_000_000]
     assert recording.names == ("hopper:2", "train:5", "hopper:0")
     # A control step earns its velocity and 1 for being up, and loses at most 3e-3 for its action.
