@@ -24,6 +24,14 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--robots-per-trial", type=int, default=100)
     parser.add_argument("--physics", default="auto", choices=[*PHYSICS, *(f"native-{name}" for name in INTEGRATORS)])
     parser.add_argument("--fit-steps", type=int, help="control steps of each new robot for fitting its v_h (HCP-I); 0 skips it")
+    parser.add_argument(
+        "--first-steps",
+        type=int,
+        nargs="+",
+        default=(),
+        metavar="N",
+        help="also regress v_h of each new robot from its first N control steps (HCP-I with identification): 50 200 1000",
+    )
     parser.add_argument("--types", nargs="*", help="robot types to evaluate, A to K (the hopper has one: hopper)")
     parser.add_argument(
         "--range",
@@ -50,13 +58,15 @@ def main(arguments: list[str] | None = None) -> None:
         check_types(config, options.types or ())
         if options.pool and options.range:
             raise ConfigError("--range: not with --pool, whose robots are drawn already")
+        if options.first_steps and task != "hopper":
+            raise ConfigError("--first-steps: goes with a policy of hoppers")
         if options.robot and (task == "hopper" or options.types or options.pool or options.range):
             raise ConfigError("--robot: goes with a policy of arms, and not with --types, --pool or --range")
         command_line.enable_compilation_cache()
         settings = {name: getattr(options, name) for name in ("trials", "robots_per_trial", "physics", "seed", "best")}
         settings |= {"ranges": [read_range(*words) for words in options.range], "pool_folder": options.pool}
         if task == "hopper":
-            record = evaluate_hoppers(options.run, fit_steps=options.fit_steps, **settings)
+            record = evaluate_hoppers(options.run, fit_steps=options.fit_steps, first_steps=options.first_steps, **settings)
         else:
             if options.robot:
                 robot = load_robot(options.robot, options.base, options.tip)

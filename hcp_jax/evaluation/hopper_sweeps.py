@@ -9,6 +9,7 @@ import numpy as np
 from hcp_jax.algorithms.ppo import PPOState
 from hcp_jax.config import PoolConfig
 from hcp_jax.envs.episodes import Episodes
+from hcp_jax.evaluation.first_steps import regress_v_h
 from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, load_pool
 from hcp_jax.evaluation.statistics import describe_evaluation, robot_rows, summarise_trials
 from hcp_jax.experiment.build import make_experiment
@@ -31,6 +32,7 @@ def evaluate_hoppers(
     robots_per_trial: int,
     physics: str = "auto",
     fit_steps: int | None = None,
+    first_steps: Sequence[int] = (),
     seed: int = 0,
     best: bool = False,
     ranges: Sequence[RangeChange] = (),
@@ -41,13 +43,15 @@ def evaluate_hoppers(
     Training robots are taken in order, all of them before any twice; new robots are held-out robots
     0..trials*robots_per_trial-1, or those of a saved pool in order, one episode each. Where v_h is learned, new robots get
     the mean embedding (`heldout`) and, if `fit_steps` is above 0, a v_h fitted to their experience with the networks frozen
-    (`heldout_fitted`).
+    (`heldout_fitted`). For each n of `first_steps`, `heldout_first_n` are those with the v_h that their first n control steps
+    speak for.
 
     Args:
         folder: a run folder.
         trials, robots_per_trial: numbers of trials and of robots in each.
         physics: engine, may be `native-INTEGRATOR`.
         fit_steps: control steps of each new robot for fitting; None takes the config's.
+        first_steps: numbers of control steps to regress v_h from (`hcp_jax.evaluation.first_steps`).
         seed: seed of the episodes' initial states.
         best: take the checkpoint with the highest return on training robots.
         ranges: ranges that the new robots are drawn from, where others than in training.
@@ -65,6 +69,10 @@ def evaluate_hoppers(
     record = describe_evaluation(run, folder, iteration, trials, robots_per_trial, ranges, pool_folder)
     record |= {"types": {}, "sets": {}, "robots": []}
     sets = choose_sets(run, state, trials * robots_per_trial, fit_steps, ranges, pool_folder)
+    if first_steps:
+        heldout, new, _ = sets["heldout"]
+        regressed = regress_v_h(run, state, heldout, first_steps, jax.random.key(seed + 1))
+        sets |= {f"heldout_first_{steps}": (heldout, new, v_h[new]) for steps, v_h in regressed.items()}
     for name, (pool, rows, v_h) in sets.items():
         episodes = play_trials(run, state, pool, rows, v_h, trials, jax.random.key(seed))
         record["sets"][name] = summarise_trials(episodes)
