@@ -1,8 +1,8 @@
 """v_h of new hoppers, regressed from their own first control steps (paper, section 5.2, its suggestion for HCP-I).
 
-An identified run (`embedding.identify_steps`) holds a forward model that predicts a robot's next observation from its v_h. A new
-robot acts for some steps as the training robots did while they were identified; its v_h is the one under which the frozen
-model predicts these steps best, drawn a little towards the training robots' mean. Policy and model learn nothing.
+An identified run (`embedding.identify_steps`) holds a forward model that predicts a robot's next observation from its v_h. A
+new robot acts for some steps as the training robots did while they were identified; its v_h is the one under which the
+frozen model predicts these steps best, drawn a little towards the training robots' mean. Policy and model learn nothing.
 """
 
 from collections.abc import Sequence

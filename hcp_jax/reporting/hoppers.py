@@ -16,6 +16,7 @@ KINDS = {
     "heldout_return": "held-out robots",
     "heldout_fitted_return": "held-out robots, v_h fitted",
 }
+FIRST = "heldout_first_"
 COLLECT_COMMAND = "python -m hcp_jax.collect runs/hopper --out results"
 
 
@@ -24,7 +25,7 @@ def hopper_section(published: Published) -> Section:
     return Section(
         "hopper",
         "Hopper",
-        (make_performance(published), make_new_hoppers(published), make_embedding(published)),
+        (make_performance(published), make_first_steps(published), make_new_hoppers(published), make_embedding(published)),
         f"The paper shows these as figures without numbers, so there are none to set beside ours. {SPREAD}",
     )
 
@@ -59,6 +60,38 @@ def make_performance(published: Published) -> Item:
     ]
     commands = ("python -m hcp_jax.sweep experiments/hopper_curves.py --seeds 3 --out runs/hopper", COLLECT_COMMAND)
     return Item("Learning curves", "", tables, tuple(figure for figure in figures if figure), commands)
+
+
+def make_first_steps(published: Published) -> Item:
+    """What HCP-I is worth on a hopper that it never saw, by how much the hopper has shown of itself."""
+    folder = published.find("hopper/evaluations")
+    paths, returns = sorted(folder.glob("*_first_steps.json")) if folder else [], {}
+    for path in paths:
+        with naming(path):
+            for name, outcome in read_json(path, dict)["sets"].items():
+                returns.setdefault(name_set(name), []).append(number(outcome["return_mean"]))
+    rows = tuple(
+        Row((steps, show_return(np.mean(values), np.std(values)), str(len(values)))) for steps, values in returns.items()
+    )
+    caption = "Return of one episode: mean and standard deviation over seeds"
+    columns = ("v_h from", "return", "seeds")
+    tables = (Table(caption, columns, "lrr", rows, tuple(published.show(path) for path in paths)),) if rows else ()
+    text = (
+        "100 hoppers that the policy never saw, networks frozen. v_h is the one with which the forward model best predicts a "
+        "hopper's own first control steps (8 ms each), or the mean of the hoppers trained on, or what those learned in training."
+    )
+    command = (
+        "python -m hcp_jax.evaluate results/policies/hopper_hcpi_s0 --trials 1 --fit-steps 0 --first-steps 10 50 200 1000 "
+        "--without-robots --json results/hopper/evaluations/hopper_hcpi_s0_first_steps.json"
+    )
+    return Item("New hoppers, from their first steps", text, tables, (), (command,))
+
+
+def name_set(name: str) -> str:
+    """What the hoppers of a record's set know of themselves."""
+    if name.startswith(FIRST):
+        return f"{int(name.removeprefix(FIRST)):,} control steps of its own"
+    return {"train": "training (robots trained on)", "heldout": "nothing: the mean"}[name]
 
 
 def make_new_hoppers(published: Published) -> Item:

@@ -216,6 +216,10 @@ def results(tiny_arms, tiny_config, tmp_path_factory) -> pathlib.Path:
         folder / "hopper" / "embedding.json",
         {"neighbours": 5, "r2": 0.5, "embedding": [[0.0, 1.0], [2.0, 3.0], [4.0, 5.0]], "torso_mass": [1.0, 2.0, 3.0]},
     )
+    for seed in (0, 1):
+        sets = {"train": 100.0, "heldout": 10.0, "heldout_first_50": 40.0 + 20.0 * seed}
+        record = {"sets": {name: {"return_mean": mean} for name, mean in sets.items()}}
+        write_json(folder / "hopper" / "evaluations" / f"hopper_hcpi_s{seed}_first_steps.json", record)
     return folder
 
 
@@ -232,6 +236,13 @@ def test_the_stress_test_stands_beside_the_papers(tiny):
     assert shown["2 to 10"] == ("not run", "100.00", "")
     assert len(rows) == len(PAPER_DAMPING)
     assert any("Violins" in alt for alt in tiny.pictures["damping"])
+
+
+def test_what_first_steps_tell_is_averaged_over_seeds(tiny):
+    rows = tiny.rows("hopper", "Return of one episode: mean and standard deviation over seeds")
+    shown = {row["v_h from"]: (row["return"], row["seeds"]) for row in rows}
+    assert shown["50 control steps of its own"] == ("50.0 \N{PLUS-MINUS SIGN} 10.0", "2")
+    assert shown["nothing: the mean"] == ("10.0 \N{PLUS-MINUS SIGN} 0.0", "2")
 
 
 def test_distances_are_violins_where_single_episodes_are_kept_and_boxes_where_quantiles_are(tiny):
@@ -303,6 +314,7 @@ DAMAGED = {
     ),
     "summary": ("hopper/summary.json", '[{"algorithm": "PPO"}]', "no field"),
     "finetune": ("hopper/finetune.json", '[{"run": "a"}]', "no field"),
+    "first steps": ("hopper/evaluations/hopper_hcpi_s0_first_steps.json", '{"sets": {"else": {"return_mean": 1}}}', "else"),
     "embedding": (
         "hopper/embedding.json",
         '{"embedding": [[1, 2]], "torso_mass": [1, 2]}',
