@@ -78,7 +78,7 @@ def make_first_steps(published: Published) -> Item:
     tables = (Table(caption, columns, "lrr", rows, tuple(published.show(path) for path in paths)),) if rows else ()
     text = (
         "100 hoppers that the policy never saw, networks frozen. v_h is the one with which the forward model best predicts "
-        "a hopper's own first control steps (8 ms each), or the mean of the hoppers trained on, or what those learned in training."
+        "a hopper's own first control steps (8 ms each), or the mean of those trained on, or what those learned."
     )
     command = (
         "python -m hcp_jax.evaluate results/policies/hopper_hcpi_s0 --trials 1 --fit-steps 0 --first-steps 10 50 200 1000 "
