@@ -19,11 +19,8 @@ CHANGES = {
     },
     "without_stop_at_success": {"stop_at_success": PAPER.stop_at_success},
     "without_learning_rate_decay": {"learning_rate_decay": PAPER.learning_rate_decay},
+    "with_the_papers_batch_size": presets.SMALL_BATCHES,
     "without_failing_share": {"failing_share": PAPER.failing_share},
-}
-# What the paper's batch size, which `fast` keeps, is worth: the peg's larger one, as many samples in all.
-CHANGES["with_batches_of_1024"] = {
-    name: getattr(presets.FAST_PEG_DDPG, name) for name in ("batch_size", "updates_per_iteration", "tau")
 }
 
 

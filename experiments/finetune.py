@@ -26,6 +26,7 @@ def get_config() -> Config:
         eval_every=128_000,
         ddpg=dataclasses.replace(
             presets.FAST_DDPG,
+            **presets.SMALL_BATCHES,
             actor_learning_rate=3e-4,
             critic_learning_rate=3e-4,
             warmup_episodes=0,

@@ -65,8 +65,7 @@ def test_a_row_holds_type_default_and_the_docstrings_text(rows):
 
 def test_presets_are_listed_where_they_differ(pages):
     page = pages.configuration_page().partition("## Presets")[2]
-    paper, fast = DDPGConfig().updates_per_iteration, FAST_DDPG.updates_per_iteration
-    assert f"| reacher | `ddpg.updates_per_iteration` | `{paper}` | `{fast}` |" in page
+    assert f"| reacher | `ddpg.batch_size` | `{DDPGConfig().batch_size}` | `{FAST_DDPG.batch_size}` |" in page
     assert "`ppo.num_epochs`" not in page, "the same in both"
 
 
