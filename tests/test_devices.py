@@ -73,7 +73,8 @@ def test_training_on_several_devices_comes_out_as_on_one(num_devices, names):
         np.testing.assert_allclose(on_many[name], on_one[name], atol=2e-4, err_msg=name)
         if name != "mjx":
             assert set(on_one[f"{name}_stepped"]) == {8}
-            assert on_many[f"{name}_stepped"] == on_one[f"{name}_stepped"]
+            assert set(on_many[f"{name}_stepped"]) == {8 // num_devices}  # each device steps its own
+            assert sum(on_many[f"{name}_stepped"]) == sum(on_one[f"{name}_stepped"])
     if "hopper" in names:
         assert on_many["shards"] == [8 // num_devices] * num_devices
     if "arms" in names:

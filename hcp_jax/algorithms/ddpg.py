@@ -23,7 +23,7 @@ from hcp_jax.algorithms.guard import Skipped, apply_update, init_skipped
 from hcp_jax.algorithms.her import relabel_goals
 from hcp_jax.algorithms.replay import EpisodeBatch, Replay, StepSample, add_episodes, episode_shapes, init_replay, sample_steps
 from hcp_jax.config import DDPGConfig
-from hcp_jax.devices import split_rows
+from hcp_jax.devices import put_everywhere, split_rows
 from hcp_jax.envs.goal import GoalState, GoalTransition
 from hcp_jax.policies.networks import Critic, DeterministicActor, JointActor, JointCritic
 
@@ -188,7 +188,7 @@ class DDPG:
         return jnp.where(varied, running_statistics.normalize(inputs, statistics, max_abs_value=5.0), 0.0)
 
     def _train(self, state: DDPGState, num_iterations: jax.Array) -> DDPGState:
-        return jax.lax.fori_loop(0, num_iterations, lambda _, s: self._train_iteration(s), state)
+        return put_everywhere(jax.lax.fori_loop(0, num_iterations, lambda _, s: self._train_iteration(s), state))
 
     def _train_iteration(self, state: DDPGState) -> DDPGState:
         key, key_collect, key_update = jax.random.split(state.key, 3)

@@ -30,7 +30,7 @@ from hcp_jax.algorithms.identification import (
 )
 from hcp_jax.algorithms.returns import compute_gae
 from hcp_jax.config import EmbeddingConfig, PPOConfig
-from hcp_jax.devices import split_rows
+from hcp_jax.devices import put_everywhere, split_rows
 from hcp_jax.envs.base import EnvState, Transition
 from hcp_jax.policies.conditioning import Conditioning
 from hcp_jax.policies.distribution import gaussian_entropy, gaussian_log_prob, sample_gaussian
@@ -218,7 +218,8 @@ class PPO:
         return self._apply(network, self.normalize(obs, statistics), v_h, method="act")[0]
 
     def _train(self, state: PPOState, num_iterations: jax.Array) -> PPOState:
-        return jax.lax.fori_loop(0, num_iterations, lambda _, s: self._train_iteration(s), state)
+        state = jax.lax.fori_loop(0, num_iterations, lambda _, s: self._train_iteration(s), state)
+        return put_everywhere(state.replace(env_state=None)).replace(env_state=split_rows(state.env_state))
 
     def _train_iteration(self, state: PPOState) -> PPOState:
         key, key_collect, key_update = jax.random.split(state.key, 3)

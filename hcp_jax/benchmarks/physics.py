@@ -3,7 +3,8 @@
 | row | what is timed |
 |---|---|
 | `mj_step` | a Python loop over robots and substeps, one thread |
-| `mujoco.batch` | MuJoCo's own thread pool on all cores, given its controls once: the bound of `native` |
+| `mujoco.batch` | MuJoCo's own thread pool on all cores, given its controls once, an MjModel per robot |
+| `mujoco.batch.expand` | the same with one MjModel, expanded where the robots differ: the bound of `native` |
 | `native`, `mjx-warp`, `mjx-jax` | the jitted environment on that engine, with random actions |
 | `rollout` | the same on the default engine, with the experiment's policy in the loop |
 """
@@ -21,13 +22,14 @@ import mujoco.batch
 import numpy as np
 
 from hcp_jax.config import Config
+from hcp_jax.devices import split_rows
 from hcp_jax.experiment.arm import ArmExperiment
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.experiment.hopper import HopperExperiment, train_v_h
-from hcp_jax.physics.native import MJ_INTEGRATORS
+from hcp_jax.physics.native import MJ_INTEGRATORS, get_batch_fields
 
 ENGINES = ("native", "mjx-warp", "mjx-jax")
-ROWS = ("mj_step", "mujoco.batch", *ENGINES, "rollout")
+ROWS = ("mj_step", "mujoco.batch", "mujoco.batch.expand", *ENGINES, "rollout")
 REPEATS = 3
 # Fused as XLA does by default on a CPU, the kinematics of a chain of seven joints take 5 s instead of 1 ms (jax 0.10, 8 arms).
 _MJX_JAX_ON_CPU = {"xla_cpu_use_fusion_emitters": False}
@@ -52,8 +54,8 @@ def benchmark_physics(config: Config, batches: list[int], rows: list[str], secon
         for name in rows:
             if name == "mj_step":
                 steps = make_mj_step(run, num_envs)
-            elif name == "mujoco.batch":
-                steps = make_batch(run, num_envs)
+            elif name.startswith("mujoco.batch"):
+                steps = make_batch(run, num_envs, name.endswith("expand"))
             else:
                 with_policy = name == "rollout"
                 steps = make_rollout(run, run.physics if with_policy else name, num_envs, with_policy)
@@ -102,7 +104,7 @@ def make_rollout(run: ArmExperiment | HopperExperiment, engine: str, num_envs: i
                 action = jax.random.uniform(key_action, (num_envs, env.action_size), minval=-1.0, maxval=1.0)
             else:
                 action = policy(state)
-            return env.step(state, action)[0], key
+            return split_rows(env.step(state, action)[0]), key
 
         return jax.lax.fori_loop(0, count, step, (state, key))
 
@@ -137,11 +139,16 @@ def make_models(run: ArmExperiment | HopperExperiment, num_envs: int) -> tuple[l
     return [models[row] for row in rows], np.asarray(state.physics.qpos, np.float64), env.task.num_substeps
 
 
-def make_batch(run: ArmExperiment | HopperExperiment, num_envs: int) -> Callable[[int], None]:
-    """n control steps of `mujoco.batch` on all cores."""
+def make_batch(run: ArmExperiment | HopperExperiment, num_envs: int, expand: bool) -> Callable[[int], None]:
+    """n control steps of `mujoco.batch` on all cores, on a model per robot or on one whose fields are expanded."""
     models, qpos, substeps = make_models(run, num_envs)
     batch = mujoco.batch.Batch(models[0], num_envs, len(os.sched_getaffinity(0)))
-    batch.set_models(models)
+    if expand:
+        rows = np.arange(num_envs) % run.train_pool.num_robots
+        for name, values in get_batch_fields(run.train_pool, models[0]).items():
+            batch.expand(name)[:] = values[rows]
+    else:
+        batch.set_models(models)
     batch.qpos[:] = qpos
     batch.ctrl[:] = np.random.default_rng(0).uniform(-1.0, 1.0, batch.ctrl.shape)
 

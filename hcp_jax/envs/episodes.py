@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
+from hcp_jax.devices import gather
 from hcp_jax.envs.base import PoolEnv
 from hcp_jax.physics.base import PhysicsOverflowError, PhysicsState
 
@@ -89,7 +90,7 @@ class Evaluator:
 
 def without_overflow(episodes):
     """The episodes on the host. Raises PhysicsOverflowError if the physics dropped contacts or constraints."""
-    episodes = jax.device_get(episodes)
+    episodes = jax.device_get(gather(episodes))
     if episodes.overflow:
         raise PhysicsOverflowError(int(episodes.overflow))
     return episodes

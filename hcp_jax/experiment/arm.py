@@ -141,7 +141,7 @@ def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:
 
 def check_memory(config: Config, num_bytes: int) -> None:
     """Raises ConfigError if a replay buffer of `num_bytes` does not fit the device that trains."""
-    stats = jax.devices()[0].memory_stats() or {}
+    stats = jax.local_devices()[0].memory_stats() or {}
     memory = stats.get("bytes_limit") or os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if num_bytes > memory:
         raise ConfigError(

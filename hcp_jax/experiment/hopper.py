@@ -217,7 +217,7 @@ class EmbeddingFitter:
             actor = state.reserve
         mean = jnp.tile(state.params["embedding"].mean(axis=0), (self._num_robots, 1))
         params = {"network": put_actor(actor, state.params["network"]), "embedding": mean}
-        fit_state = self._ppo.init(self._key).replace(
+        fit_state = replicate(self._ppo.init(self._key)).replace(
             params=copy_tree(params),
             obs_statistics=copy_tree(actor.obs_statistics),
             model_statistics=copy_tree(state.model_statistics),

@@ -4,7 +4,7 @@ An arm is edited and compiled as MuJoCo sees it (`arm_reacher.xml`, `arm_peg.xml
 template that all arms share. So composite inertias are MuJoCo's own, and every type stands in the same pool.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import mujoco
 import numpy as np
@@ -47,11 +47,6 @@ def make_chain_pool(
     torque_limit [N, 7] N m; link_mass [N, 7] kg; damping, frictionloss, armature [N, 7]; type [N, 1], a position in `TYPES`;
     start_angles [N, S, 7] rad, as given.
     """
-    spec = mujoco.MjSpec.from_file(str(robots_path() / template))
-    models = []
-    for chain in chains:
-        edit_spec(spec, chain)
-        models.append(spec.compile())
     hardware = {name: np.stack([chain.padded(name) for chain in chains]) for name in _HARDWARE}
     hardware |= {
         "chain_pos": np.stack([chain.padded("pos") for chain in chains]),
@@ -63,10 +58,18 @@ def make_chain_pool(
     }
     return RobotPool(
         template=(robots_path() / template).read_text(),
-        fields=stack_models(models),
+        fields=stack_models(compile_chains(template, chains)),
         hardware=hardware,
         robot_id=np.asarray(robot_id, np.int32),
     )
+
+
+def compile_chains(template: str, chains: Sequence[Chain]) -> Iterator[mujoco.MjModel]:
+    """One MjModel per chain, in a template of `robots/`."""
+    spec = mujoco.MjSpec.from_file(str(robots_path() / template))
+    for chain in chains:
+        edit_spec(spec, chain)
+        yield spec.compile()
 
 
 def read_pooled_chain(pool: RobotPool, row: int) -> Chain:

@@ -4,7 +4,7 @@ import hashlib
 import importlib.resources
 import json
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import jax
@@ -148,23 +148,24 @@ def _device_dtype(leaf: Array):
     return jnp.int32 if jnp.issubdtype(leaf.dtype, jnp.integer) else jnp.float32
 
 
-def stack_models(models: Sequence[mujoco.MjModel]) -> dict[str, np.ndarray]:
-    """Stacks the fields in `VARIANT_FIELDS` of models compiled from one template.
+def stack_models(models: Iterable[mujoco.MjModel]) -> dict[str, np.ndarray]:
+    """Stacks the fields in `VARIANT_FIELDS` of models compiled from one template, of which it keeps none.
 
     Raises:
         PoolError: the models differ in their sizes or in a field outside `VARIANT_FIELDS`.
     """
-    first = models[0]
-    for name in _array_fields(first):
-        if name in VARIANT_FIELDS:
-            continue
-        reference = getattr(first, name)
-        for robot, model in enumerate(models):
-            if not np.array_equal(getattr(model, name), reference):
+    rows: dict[str, list] = {name: [] for name in (*VARIANT_FIELDS, MEAN_INERTIA)}
+    reference: dict[str, bytes] = {}
+    for robot, model in enumerate(models):
+        if not robot:
+            reference = {name: getattr(model, name).tobytes() for name in _array_fields(model) if name not in VARIANT_FIELDS}
+        for name, values in reference.items():
+            if getattr(model, name).tobytes() != values:
                 raise PoolError(f"robot {robot} differs from robot 0 in MjModel.{name}, which pools do not batch")
-    fields = {name: np.stack([getattr(model, name) for model in models]) for name in VARIANT_FIELDS}
-    fields[MEAN_INERTIA] = np.asarray([model.stat.meaninertia for model in models])
-    return fields
+        for name in VARIANT_FIELDS:
+            rows[name].append(getattr(model, name).copy())
+        rows[MEAN_INERTIA].append(model.stat.meaninertia)
+    return {name: np.stack(values) for name, values in rows.items()}
 
 
 def _array_fields(model: mujoco.MjModel) -> list[str]:

@@ -4,11 +4,13 @@ import os
 import threading
 
 import jax
+import jax.numpy as jnp
 import mujoco
 import mujoco.batch
 import numpy as np
 
-from hcp_jax.hardware.pool import RobotPool
+from hcp_jax.devices import ROWS, get_mesh
+from hcp_jax.hardware.pool import MEAN_INERTIA, RobotPool
 from hcp_jax.physics.base import PhysicsState
 
 _WARNING = mujoco.mjtWarning
@@ -23,60 +25,95 @@ MJ_INTEGRATORS = {
 
 
 class NativePhysics:
-    """`mujoco.batch` behind `jax.pure_callback`: each world runs its robot's own MjModel, in float64 inside a step.
+    """`mujoco.batch` behind `jax.pure_callback`: each world has its robot's own model fields, in float64 inside a step.
 
-    The callback gets and returns the whole state, so it may be elided or repeated. Results do not depend on the
-    number of threads.
+    The callback gets and returns the whole state, so it may be elided or repeated. Each device calls it for its own worlds, on
+    its share of the cores. Results do not depend on the number of threads.
     """
 
     def __init__(self, pool: RobotPool, sim_dt: float, integrator: str):
-        self._models = pool.models()
-        for model in self._models:
-            model.opt.timestep = sim_dt
-            model.opt.integrator = MJ_INTEGRATORS[integrator]
+        self._model = pool.template_model()
+        self._model.opt.timestep = sim_dt
+        self._model.opt.integrator = MJ_INTEGRATORS[integrator]
+        self._fields = get_batch_fields(pool, self._model)
         self._row_order = np.argsort(pool.robot_id)
         self._sorted_ids = np.asarray(pool.robot_id)[self._row_order]
         if np.any(np.diff(self._sorted_ids) == 0):
             raise ValueError("a pool with two robots of one id cannot be simulated")
-        self._worlds: dict[int, _Worlds] = {}
+        self._worlds: dict[tuple[int, int], _Worlds] = {}  # by device and number
         self._lock = threading.Lock()
 
     def step(
         self, robots: RobotPool, state: PhysicsState, ctrl: jax.Array, num_substeps: int
     ) -> tuple[PhysicsState, jax.Array]:
+        def step_own_worlds(robot_id: jax.Array, state: PhysicsState, ctrl: jax.Array):
+            return self._step_on_device(robot_id, state, ctrl, num_substeps)
+
+        arguments, num_worlds, mesh = (robots.robot_id, state, ctrl), ctrl.shape[0], get_mesh()
+        num_padded = -(-num_worlds // mesh.size) * mesh.size
+        if num_padded != num_worlds:  # the first ones again, so that every device has as many
+            arguments = jax.tree.map(lambda leaf: leaf[jnp.arange(num_padded) % num_worlds], arguments)
+        step = jax.shard_map(step_own_worlds, mesh=mesh, in_specs=ROWS, out_specs=ROWS, check_vma=False)
+        state, overflowed = jax.tree.map(lambda leaf: leaf[:num_worlds], step(*arguments))
+        return state, jnp.sum(overflowed, dtype=jnp.int32)
+
+    def _step_on_device(self, robot_id: jax.Array, state: PhysicsState, ctrl: jax.Array, num_substeps: int):
         shapes = (
             *(jax.ShapeDtypeStruct(leaf.shape, np.float32) for leaf in (state.qpos, state.qvel, state.qacc_warmstart)),
-            jax.ShapeDtypeStruct((), np.int32),
+            jax.ShapeDtypeStruct(robot_id.shape, bool),
         )
 
-        def host_step(robot_id, state, ctrl):
-            with self._lock:
-                return self._host_step(num_substeps, *jax.tree.map(np.asarray, (robot_id, state, ctrl)))
+        def host_step(device, robot_id, state, ctrl):
+            robot_id, state, ctrl = jax.tree.map(np.asarray, (robot_id, state, ctrl))
+            return self._host_step(num_substeps, robot_id, state, ctrl, int(device))
 
-        qpos, qvel, warmstart, overflow = jax.pure_callback(host_step, shapes, robots.robot_id, state, ctrl)
-        return state.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warmstart), overflow
+        device = jax.lax.axis_index(ROWS[0])
+        qpos, qvel, warmstart, overflowed = jax.pure_callback(host_step, shapes, device, robot_id, state, ctrl)
+        return state.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warmstart), overflowed
 
-    def _host_step(self, num_substeps, robot_id, state, ctrl):
-        num_worlds = len(robot_id)
-        if num_worlds not in self._worlds:
-            self._worlds[num_worlds] = _Worlds(self._models[0], num_worlds)
-        worlds = self._worlds[num_worlds]
+    def _host_step(self, num_substeps, robot_id, state, ctrl, device=0):
+        with self._lock:
+            key = (device, len(robot_id))
+            if key not in self._worlds:
+                self._worlds[key] = _Worlds(self._model, len(robot_id))
         rows = self._row_order[np.searchsorted(self._sorted_ids, robot_id)]
-        return worlds.step(self._models, rows, state, ctrl, num_substeps)
+        return self._worlds[key].step(self._fields, rows, state, ctrl, num_substeps)
+
+
+def get_batch_fields(pool: RobotPool, model: mujoco.MjModel) -> dict[str, np.ndarray]:
+    """What a pool's robots have in place of the fields of `model`, for `mujoco.batch.Batch.expand`: [N, ...] by name.
+
+    A batch has one `stat.meaninertia` for all. Only the solver reads it, as a factor of its tolerance: so the tolerance has it.
+    """
+    fields = {name: np.asarray(values) for name, values in pool.fields.items() if name != MEAN_INERTIA}
+    varied = {name: values for name, values in fields.items() if np.any(values != getattr(model, name))}
+    inertia = np.asarray(pool.fields[MEAN_INERTIA]) / model.stat.meaninertia
+    return varied | {"opt.tolerance": model.opt.tolerance * inertia}
 
 
 class _Worlds:
     """B simulations on a thread pool; remembers which robots stand in them."""
 
     def __init__(self, model: mujoco.MjModel, num_worlds: int):
-        self._batch = mujoco.batch.Batch(model, num_worlds, len(os.sched_getaffinity(0)))
+        num_threads = max(1, len(os.sched_getaffinity(0)) // jax.local_device_count())
+        self._batch = mujoco.batch.Batch(model, num_worlds, num_threads)
         self._rows = np.full(num_worlds, -1)
+        self._lock = threading.Lock()
 
-    def step(self, models, rows, state, ctrl, num_substeps):
+    def step(self, fields, rows, state, ctrl, num_substeps):
+        with self._lock:
+            self._place_robots(fields, rows)
+            return self._step(state, ctrl, num_substeps)
+
+    def _place_robots(self, fields, rows):
+        changed = np.flatnonzero(rows != self._rows)
+        if changed.size:
+            for name, values in fields.items():
+                self._batch.expand(name)[changed] = values[rows[changed]]
+            self._rows = rows
+
+    def _step(self, state, ctrl, num_substeps):
         batch = self._batch
-        if not np.array_equal(rows, self._rows):
-            batch.set_models([models[row] for row in rows])
-            self._rows = rows.copy()
         batch.qpos[:], batch.qvel[:], batch.qacc_warmstart[:], batch.ctrl[:] = (
             state.qpos,
             state.qvel,
@@ -92,5 +129,4 @@ class _Worlds:
         diverged = batch.warning[:, _DIVERGED, _COUNT].any(axis=1)
         if diverged.any():
             qpos[diverged] = qvel[diverged] = warmstart[diverged] = np.nan
-        overflow = np.int32(batch.warning[:, _OVERFLOWED, _COUNT].any(axis=1).sum())
-        return qpos, qvel, warmstart, overflow
+        return qpos, qvel, warmstart, batch.warning[:, _OVERFLOWED, _COUNT].any(axis=1)

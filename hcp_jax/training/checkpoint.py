@@ -8,6 +8,7 @@ import jax
 import orbax.checkpoint as ocp
 from absl import logging as absl_logging
 
+from hcp_jax.devices import any_process, is_main
 from hcp_jax.errors import UserError, one_line
 from hcp_jax.experiment.base import TrainingState
 
@@ -17,7 +18,10 @@ class CheckpointError(UserError):
 
 
 class Checkpoints:
-    """The `checkpoints/` folder of a run: `newest/` and `best/`, each with a folder per number of iterations."""
+    """The `checkpoints/` folder of a run: `newest/` and `best/`, each with a folder per number of iterations.
+
+    Of several processes each must make the same calls; what is on all devices, process 0 writes.
+    """
 
     def __init__(self, folder: str | pathlib.Path, keep: int = 3, read_only: bool = False):
         absl_logging.set_verbosity(absl_logging.FATAL)
@@ -28,8 +32,15 @@ class Checkpoints:
         self._best = self._make_manager("best", 1)
 
     def _make_manager(self, name: str, keep: int) -> ocp.CheckpointManager:
-        options = ocp.CheckpointManagerOptions(max_to_keep=keep, read_only=self._read_only, create=not self._read_only)
-        handlers = {"state": ocp.StandardCheckpointHandler()}
+        # Two managers save at once: processes must not take one's barrier for the other's.
+        processes = ocp.options.MultiprocessingOptions(barrier_sync_key_prefix=name)
+        options = ocp.CheckpointManagerOptions(
+            max_to_keep=keep,
+            read_only=self._read_only,
+            create=not self._read_only,
+            multiprocessing_options=processes,
+        )
+        handlers = {"state": ocp.StandardCheckpointHandler(multiprocessing_options=processes)}
         return ocp.CheckpointManager(self.folder / name, options=options, item_handlers=handlers)
 
     def save(self, iteration: int, state: TrainingState, is_best: bool = False) -> None:
@@ -91,9 +102,10 @@ class Checkpoints:
     def _move_aside(self, iteration: int) -> None:
         if not self._read_only:
             aside = self.folder / "damaged" / str(iteration)
-            aside.parent.mkdir(exist_ok=True)
-            if not aside.exists():
+            if is_main() and not aside.exists():
+                aside.parent.mkdir(exist_ok=True)
                 (self.folder / "newest" / str(iteration)).rename(aside)
+            any_process(False)  # the others wait for it
             self._newest.reload()
 
     def _read_checked(

@@ -7,6 +7,7 @@ train(config, folder):
     at every eval_every steps:             evaluate, metrics.csv, checkpoint
 """
 
+import contextlib
 import dataclasses
 import math
 import pathlib
@@ -18,6 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hcp_jax.config import Config
+from hcp_jax.devices import any_process, do_in_main, is_main
 from hcp_jax.experiment.base import Experiment, TrainingState
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.physics.base import PhysicsOverflowError
@@ -25,7 +27,7 @@ from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import Checkpoints
 from hcp_jax.training.curves import plot_curves
 from hcp_jax.training.metrics import MetricsWriter
-from hcp_jax.training.progress import Progress, format_seconds
+from hcp_jax.training.progress import Progress, format_seconds, say
 from hcp_jax.training.warm_start import load_init
 
 # Control steps between two progress lines: a few seconds of work.
@@ -55,7 +57,7 @@ class Interrupt:
 
 
 def train(config: Config, folder: pathlib.Path, resume: bool = False) -> dict[str, float] | None:
-    """Trains `config` in `folder`.
+    """Trains `config` in `folder`, which all processes that train together see and process 0 writes.
 
     Returns:
         The last evaluation's metrics, or None if the run was interrupted (a checkpoint is saved then).
@@ -65,20 +67,22 @@ def train(config: Config, folder: pathlib.Path, resume: bool = False) -> dict[st
         PhysicsOverflowError: the physics dropped contacts or constraints.
         NonFiniteError: losses or gradients stopped being finite; the newest checkpoint is from before.
     """
-    if resume:
-        run_folder.check_resumable(folder, config)
-    else:
-        run_folder.check_new(folder)
+    do_in_main(lambda: run_folder.check_resumable(folder, config) if resume else run_folder.check_new(folder))
     init = load_init(config) if config.init else None
-    print(f"{config.name}: compiling {config.pool.num_robots + config.pool.num_heldout} robots", flush=True)
+    say(f"{config.name}: compiling {config.pool.num_robots + config.pool.num_heldout} robots")
     run = make_experiment(config)
     state = run.init_state()
     if init is not None:
         state = init(run, state)
-    with run_folder.lock(folder):
-        if not resume:
-            run_folder.check_new(folder)  # another process may have come first
-            run_folder.write_start(folder, config, run.physics)
+    with contextlib.ExitStack() as held:
+
+        def open_folder() -> None:
+            held.enter_context(run_folder.lock(folder))
+            if not resume:
+                run_folder.check_new(folder)  # another process may have come first
+                run_folder.write_start(folder, config, run.physics)
+
+        do_in_main(open_folder)
         return _run(run, state, folder, resume)
 
 
@@ -89,10 +93,10 @@ def _run(run: Experiment, state: TrainingState, folder: pathlib.Path, resume: bo
     if resume and checkpoints.iterations():
         iteration, state, skipped = checkpoints.restore(state)
         for line in skipped:
-            print(line, flush=True)
-        print(f"resuming at {iteration * run.config.batch_size:,} steps", flush=True)
+            say(line)
+        say(f"resuming at {iteration * run.config.batch_size:,} steps")
     elif resume:
-        print("the run ended before its first checkpoint: starting again", flush=True)
+        say("the run ended before its first checkpoint: starting again")
     interrupt = Interrupt()
     interrupt.install()
     return TrainingLoop(run, folder, checkpoints, iteration).run(state, interrupt)
@@ -107,7 +111,7 @@ class TrainingLoop:
         self._batch_size = config.batch_size
         self._chunk = max(1, round(_CHUNK_ENV_STEPS / self._batch_size))
         self._eval_iterations = max(1, round(config.eval_every / self._batch_size))
-        self._metrics = MetricsWriter(folder, self._env_steps)
+        self._metrics = MetricsWriter(folder, self._env_steps) if is_main() else None
         self._progress = Progress(run.num_iterations * self._batch_size, self._env_steps)
 
     @property
@@ -118,7 +122,10 @@ class TrainingLoop:
         run, metrics = self._run, None
         for line in run.introduce(self._iteration):
             self._progress.say(line)
-        self._progress.say(f"on {jax.devices()[0].device_kind}; compiling the training step")
+        devices, num_processes = jax.devices(), jax.process_count()
+        where = f"{len(devices)} x {devices[0].device_kind}" if len(devices) > 1 else devices[0].device_kind
+        where += f" of {num_processes} processes" if num_processes > 1 else ""
+        self._progress.say(f"on {where}; compiling the training step")
         while self._iteration < run.num_iterations:
             next_eval = min((self._iteration // self._eval_iterations + 1) * self._eval_iterations, run.num_iterations)
             count = min(self._chunk, next_eval - self._iteration)
@@ -128,7 +135,7 @@ class TrainingLoop:
             self._progress.update(self._env_steps, run.describe(state))
             if self._iteration == next_eval:
                 state, metrics = self._evaluate(state)
-            if interrupt.requested and self._iteration < run.num_iterations:
+            if any_process(interrupt.requested) and self._iteration < run.num_iterations:
                 return self._save_and_stop(state)
         self._finish(state)
         return metrics
@@ -170,11 +177,13 @@ class TrainingLoop:
             "steps_per_second": self._progress.steps_per_second(self._env_steps),
         }
         state = state.replace(sums=jax.tree.map(jnp.zeros_like, state.sums))
-        best = max((float(row[run.best_metric]) for row in self._metrics.rows()), default=-math.inf)
-        is_best = metrics[run.best_metric] >= best
-        # The row first: a resumed run drops rows after its checkpoint, but could not make up for one that is missing.
-        self._metrics.write(metrics, timing)
-        self._checkpoints.save(self._iteration, state, is_best)
+        is_best = False
+        if self._metrics:
+            best = max((float(row[run.best_metric]) for row in self._metrics.rows()), default=-math.inf)
+            is_best = metrics[run.best_metric] >= best
+            # The row first: a resumed run drops rows after its checkpoint, but could not make up for one that is missing.
+            self._metrics.write(metrics, timing)
+        self._checkpoints.save(self._iteration, state, any_process(is_best))
         self._progress.say(f"{self._env_steps:>12,} steps  {line}")
         self._report_diverged(diverged)
         return state, metrics
@@ -188,12 +197,14 @@ class TrainingLoop:
     def _save_and_stop(self, state: TrainingState) -> None:
         self._checkpoints.save(self._iteration, state)
         self._checkpoints.wait()
-        self._metrics.close()
+        if self._metrics:
+            self._metrics.close()
         self._progress.say(f"interrupted at {self._env_steps:,} steps; saved. Continue with --resume --out {self._folder}")
 
     def _finish(self, state: TrainingState) -> None:
         self._checkpoints.wait()
         self._checkpoints.close()
-        self._metrics.close()
-        plot_curves([self._folder], self._folder / "curves.png")
+        if self._metrics:
+            self._metrics.close()
+            plot_curves([self._folder], self._folder / "curves.png")
         self._progress.say(f"done in {format_seconds(self._progress.elapsed)}: {self._folder}")

@@ -1,7 +1,15 @@
-"""What a run says while it works: one line at a time, rewritten in place on a terminal."""
+"""What a run says while it works, in process 0: one line at a time, rewritten in place on a terminal."""
 
 import sys
 import time
+
+from hcp_jax.devices import is_main
+
+
+def say(text: str) -> None:
+    """Prints a line, in process 0."""
+    if is_main():
+        print(text, flush=True)
 
 
 class Progress:
@@ -19,6 +27,8 @@ class Progress:
 
     def say(self, text: str) -> None:
         """Prints a line of its own."""
+        if not is_main():
+            return
         if self._open_line:
             print(flush=True)
         self._open_line = False
@@ -26,6 +36,8 @@ class Progress:
 
     def update(self, env_steps: int, text: str) -> None:
         """Shows how far training has come, and `text`."""
+        if not is_main():
+            return
         rate = self.steps_per_second(env_steps)
         remaining = (self._total - env_steps) / rate if rate > 0 else 0.0
         line = (

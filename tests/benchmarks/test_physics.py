@@ -5,7 +5,7 @@ import pytest
 from hcp_jax import benchmark
 from hcp_jax.benchmarks.physics import time_steps
 
-ROWS = ["mj_step", "mujoco.batch", "native", "rollout"]
+ROWS = ["mj_step", "mujoco.batch", "mujoco.batch.expand", "native", "rollout"]
 
 
 @pytest.mark.parametrize("task", ["hopper", "reacher"])

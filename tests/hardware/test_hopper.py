@@ -16,7 +16,7 @@ def nominal_ranges() -> HopperRanges:
 
 def test_zero_width_ranges_leave_the_template_unchanged():
     template = mujoco.MjModel.from_xml_path(str(robots_path() / "hopper.xml"))
-    model = compile_models(sample_hardware(nominal_ranges(), 1, seed=0))[0]
+    model = next(compile_models(sample_hardware(nominal_ranges(), 1, seed=0)))
     for name in ("body_pos", "body_mass", "body_inertia", "geom_size", "dof_damping", "dof_armature", "dof_invweight0"):
         np.testing.assert_allclose(getattr(model, name), getattr(template, name), rtol=1e-12, atol=1e-12)
 
@@ -42,8 +42,8 @@ def test_link_lengths_are_the_distances_between_joints(pool):
 
 def test_mass_and_inertia_scale_together():
     double = dataclasses.replace(nominal_ranges(), torso_mass_ratio=(2.0, 2.0))
-    one = compile_models(sample_hardware(nominal_ranges(), 1, 0))[0].body("torso")
-    two = compile_models(sample_hardware(double, 1, 0))[0].body("torso")
+    one = next(compile_models(sample_hardware(nominal_ranges(), 1, 0))).body("torso")
+    two = next(compile_models(sample_hardware(double, 1, 0))).body("torso")
     assert two.mass == pytest.approx(2 * one.mass)
     np.testing.assert_allclose(two.inertia, 2 * one.inertia)
 

@@ -10,7 +10,7 @@ from hcp_jax.hardware.ranges import HopperRanges
 
 def test_rebuilt_models_equal_the_compiled_ones_in_every_array(pool):
     hardware = {name: values[:8] for name, values in pool.hardware.items()}
-    compiled, rebuilt = compile_models(hardware), pool.subset(np.arange(8)).models()
+    compiled, rebuilt = list(compile_models(hardware)), pool.subset(np.arange(8)).models()
     for one, other in zip(compiled, rebuilt, strict=True):
         for name in dir(one):
             value = None if name.startswith("_") else getattr(one, name)

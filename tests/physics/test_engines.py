@@ -3,13 +3,15 @@
 import jax
 import jax.numpy as jnp
 import mujoco
+import mujoco.batch
 import numpy as np
 import pytest
 
 from hcp_jax.envs.hopper import Hopper
-from hcp_jax.hardware.pool import RobotPool
+from hcp_jax.hardware.pool import MEAN_INERTIA, RobotPool
 from hcp_jax.physics.base import PhysicsState, is_finite, make_physics
 from hcp_jax.physics.mjx import MjxPhysics
+from hcp_jax.physics.native import get_batch_fields
 
 SIM_DT, NUM_SUBSTEPS, NUM_CONTROLS = 0.002, 4, 25
 ENGINES = ("native", "mjx-warp", "mjx-jax")
@@ -67,6 +69,20 @@ def rollout(physics, pool: RobotPool, initial: PhysicsState, controls: np.ndarra
 @pytest.fixture(scope="module")
 def final_qpos(pool, initial, controls) -> dict[str, np.ndarray]:
     return {name: rollout(make_physics(name, pool, SIM_DT, "euler"), pool, initial, controls) for name in ENGINES}
+
+
+def test_a_native_world_has_every_field_of_its_robot_and_its_solver_stops_as_its_own_model_does(pool):
+    template = pool.template_model()
+    batch = mujoco.batch.Batch(template, pool.num_robots)
+    for name, values in get_batch_fields(pool, template).items():
+        batch.expand(name)[:] = values
+    for robot, model in enumerate(pool.models()):
+        world = batch.get_model(robot)
+        for name in pool.fields:
+            if name != MEAN_INERTIA:
+                np.testing.assert_array_equal(getattr(world, name), getattr(model, name), err_msg=name)
+        stops_at = model.opt.tolerance * model.stat.meaninertia
+        np.testing.assert_allclose(world.opt.tolerance * world.stat.meaninertia, stops_at, rtol=1e-12)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
