@@ -5,7 +5,7 @@ The contract, each sentence a test:
 - `Transition.next_obs` is the observation that the step led to, also where the episode ended; `EnvState.obs` is already
   the next episode's first one.
 - An ended episode restarts with a fresh key and a robot drawn uniformly from the pool.
-- A world whose physics is not finite is terminated with reward 0 and its last finite observation.
+- A world whose physics is not plausible is terminated with reward 0 and its last plausible observation.
 """
 
 from typing import Protocol
@@ -16,7 +16,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from hcp_jax.hardware.pool import RobotPool
-from hcp_jax.physics.base import Physics, PhysicsState, is_finite, select_rows
+from hcp_jax.physics.base import Physics, PhysicsState, is_plausible, select_rows
 
 
 @struct.dataclass
@@ -129,11 +129,11 @@ class PoolEnv:
         chex.assert_shape(action, (state.index.shape[0], self.action_size))
         action = jnp.clip(action, -1.0, 1.0)
         after, overflow = self.physics.step(self.pool.take(state.index), state.physics, action, self.task.num_substeps)
-        finite = is_finite(after)
-        after = select_rows(finite, after, state.physics)
-        reward = jnp.where(finite, self.task.reward(state.physics, action, after), 0.0)
+        plausible = is_plausible(after)
+        after = select_rows(plausible, after, state.physics)
+        reward = jnp.where(plausible, self.task.reward(state.physics, action, after), 0.0)
         step_count = state.step_count + 1
-        terminated = ~finite | self.task.is_terminated(after)
+        terminated = ~plausible | self.task.is_terminated(after)
         next_state = state.replace(
             physics=after,
             obs=self.task.observe(after),
@@ -150,7 +150,7 @@ class PoolEnv:
             index=state.index,
             episode_return=next_state.episode_return,
             episode_length=step_count,
-            diverged=~finite,
+            diverged=~plausible,
             overflow=overflow,
         )
         return next_state, transition

@@ -3,7 +3,7 @@
 The contract, each sentence a test:
 - An episode does not end at success: success is a flag of each step, terminal for the learner alone.
 - Noise is on the observation; the achieved goal is where the point of interest is.
-- A world whose physics is not finite stays where it was last, and says so.
+- A world whose physics is not plausible stays where it was last, and says so.
 - Actions of missing joints are 0 and cost nothing.
 - Where the task asks for approach starts, that share of episodes starts from the pool's `approach_angles`, with the goals that
   belong to them.
@@ -18,7 +18,7 @@ from flax import struct
 
 from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
 from hcp_jax.hardware.pool import RobotPool
-from hcp_jax.physics.base import Physics, PhysicsState, is_finite, select_rows
+from hcp_jax.physics.base import Physics, PhysicsState, is_plausible, select_rows
 
 
 @struct.dataclass
@@ -120,8 +120,8 @@ class GoalEnv:
         key, key_noise = jax.random.split(state.key)
         action = jnp.clip(action, -1.0, 1.0) * self._joint_mask[state.index]
         after, overflow = self.physics.step(self.pool.take(state.index), state.physics, action, self.task.num_substeps)
-        finite = is_finite(after)
-        after = select_rows(finite, after, state.physics)
+        plausible = is_plausible(after)
+        after = select_rows(plausible, after, state.physics)
         achieved_goal = self._point_of_interest(after.qpos, state.index)
         reward, success = self.compute_reward(achieved_goal, state.desired_goal, action)
         next_state = state.replace(
@@ -132,7 +132,7 @@ class GoalEnv:
             reward=reward,
             success=success,
             distance=jnp.linalg.norm(achieved_goal - state.desired_goal, axis=-1),
-            diverged=~finite,
+            diverged=~plausible,
             overflow=overflow,
         )
         return next_state, transition

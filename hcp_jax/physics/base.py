@@ -14,7 +14,9 @@ from hcp_jax.hardware.pool import RobotPool
 
 PHYSICS = ("auto", "mjx-warp", "mjx-jax", "native")
 INTEGRATORS = ("euler", "rk4", "implicitfast")
-MAX_VALUE = 1e10  # MuJoCo's mjMAXVAL: beyond it a state counts as diverged
+# [rad, m, rad/s, m/s] Beyond it a state counts as diverged. MuJoCo says so at 1e10 only; until then the values would ruin the
+# statistics by which observations are whitened.
+MAX_VALUE = 1e3
 
 
 @struct.dataclass
@@ -48,7 +50,7 @@ def select_rows(mask: jax.Array, on_true: PhysicsState, on_false: PhysicsState) 
     return jax.tree.map(lambda a, b: jnp.where(mask.reshape((-1,) + (1,) * (a.ndim - 1)), a, b), on_true, on_false)
 
 
-def is_finite(state: PhysicsState) -> jax.Array:
+def is_plausible(state: PhysicsState) -> jax.Array:
     """Whether each world's state is usable: [B] bool."""
     rows = jnp.concatenate([state.qpos, state.qvel], axis=-1)
     return jnp.all(jnp.isfinite(rows) & (jnp.abs(rows) < MAX_VALUE), axis=-1)

@@ -9,7 +9,7 @@ import pytest
 
 from hcp_jax.envs.hopper import Hopper
 from hcp_jax.hardware.pool import MEAN_INERTIA, RobotPool
-from hcp_jax.physics.base import PhysicsState, is_finite, make_physics
+from hcp_jax.physics.base import PhysicsState, is_plausible, make_physics
 from hcp_jax.physics.mjx import MjxPhysics
 from hcp_jax.physics.native import get_batch_fields
 
@@ -122,12 +122,17 @@ def test_warp_reports_an_overflow_of_its_contact_buffer(pool, initial):
     assert int(overflow) > 0
 
 
+def test_speeds_that_no_robot_reaches_are_not_plausible_though_finite(initial):
+    fast = initial.replace(qvel=initial.qvel.at[7, 2].set(2e3).at[5, 0].set(500.0))
+    assert np.flatnonzero(~np.asarray(is_plausible(fast))).tolist() == [7]
+
+
 def test_native_marks_diverged_worlds_and_only_those(pool, initial):
     physics = make_physics("native", pool, SIM_DT, "euler")
     robots = pool.take(np.arange(pool.num_robots))
     broken = initial.replace(qvel=initial.qvel.at[7, 2].set(1e12))
     state, _ = physics.step(robots, broken, jnp.zeros((pool.num_robots, 3)), NUM_SUBSTEPS)
-    assert np.flatnonzero(~np.asarray(is_finite(state))).tolist() == [7]
+    assert np.flatnonzero(~np.asarray(is_plausible(state))).tolist() == [7]
 
 
 def test_an_unknown_engine_or_integrator_is_refused(pool):
