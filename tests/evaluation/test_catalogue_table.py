@@ -51,7 +51,9 @@ def test_variants_of_an_arm_differ_in_masses_and_joint_dynamics_alone(panda_conf
 
 
 @pytest.mark.slow
-def test_the_table_has_each_arm_zero_shot_under_each_policy_and_the_fine_tuned_one_beside_it(finished_arms, panda_run, tmp_path, capsys):
+def test_the_table_has_each_arm_under_each_policy_and_the_fine_tuned_one_beside_them(
+    finished_arms, panda_run, tmp_path, capsys
+):
     path = tmp_path / "catalogue.json"
     arguments = ["--robots", "ur5e", "panda", "--trials", "2", "--episodes-per-trial", "2", "--json", str(path)]
     catalogue.main([str(finished_arms), str(finished_arms), "--fine-tuned", str(panda_run), *arguments])
