@@ -17,10 +17,10 @@ def get_config() -> Config:
     return presets.arm(
         "finetune",
         "reacher",
-        "chain_fk",
+        "chain_fk+jacobian+dynamics",
         robot="panda",
         pool=ArmPoolConfig(types=(), left_out=(), robots_per_type=1, heldout_per_type=100, ranges=ranges),
-        init="results/policies/reacher_hcpe_leave_h_s0",
+        init="results/policies/reacher_chains_s0",
         init_layers="all",
         total_env_steps=1_280_000,
         eval_every=128_000,

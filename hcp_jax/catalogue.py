@@ -1,4 +1,4 @@
-"""`python -m hcp_jax.catalogue POLICY [--fine-tuned RUN ...] [--json results/catalogue.json]`: real arms beside each other."""
+"""`python -m hcp_jax.catalogue POLICY ... [--fine-tuned RUN ...] [--json FILE]`: policies on real arms, beside each other."""
 
 import argparse
 import pathlib
@@ -18,10 +18,10 @@ from hcp_jax.physics.base import INTEGRATORS, PHYSICS
 def main(arguments: list[str] | None = None) -> None:
     parser = command_line.OneLineParser(
         prog="hcp_jax.catalogue",
-        description="Plays a policy on every arm of the catalogue, without training and after fine-tuning.",
+        description="Plays policies on every arm of the catalogue, without training and after fine-tuning.",
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
-    parser.add_argument("policy", type=pathlib.Path, help="run folder or published policy of arms")
+    parser.add_argument("policies", nargs="+", type=pathlib.Path, help="run folders or published policies of arms")
     parser.add_argument("--fine-tuned", nargs="*", type=pathlib.Path, default=[], help="run folders of experiments/finetune.py")
     parser.add_argument("--robots", nargs="*", default=[], help=f"some of {', '.join(catalogue_names())}; all if left out")
     parser.add_argument("--trials", type=int, default=10)
@@ -34,26 +34,29 @@ def main(arguments: list[str] | None = None) -> None:
             if getattr(options, name) < 1:
                 raise ConfigError(f"--{name.replace('_', '-')}={getattr(options, name)}: expected at least 1")
         command_line.enable_compilation_cache()
-        settings = {"names": options.robots, "physics": options.physics}
-        rows = make_catalogue_table(options.policy, options.fine_tuned, options.trials, options.episodes_per_trial, **settings)
+        settings = {"trials": options.trials, "episodes_per_trial": options.episodes_per_trial}
+        settings |= {"names": options.robots, "physics": options.physics}
+        rows = make_catalogue_table(options.policies, options.fine_tuned, **settings)
     print_table(rows)
     if options.json:
         write_json(options.json, rows)
 
 
 def print_table(rows: list[dict]) -> None:
-    """One row per arm, and the median over them."""
+    """One row per arm, a column for each policy, and their medians over the arms."""
+    names = [pathlib.Path(part["policy"]).name for part in rows[0]["zero_shot"]]
     table = Table(title="success [%] on the goals of the task")
-    for head in ("arm", "goals in reach [%]", "zero-shot", "of goals in reach", "fine-tuned", "of goals in reach"):
+    for head in ("arm", "goals in reach [%]", *(f"{name}, zero-shot" for name in names), "fine-tuned"):
         table.add_column(head, justify="left" if head == "arm" else "right")
     for row in rows:
-        values = [row["reachable_share"]]
-        for part in (row["zero_shot"], row["fine_tuned"] or {}):
-            values += [part.get("success_mean"), part.get("reachable_success_mean")]
+        parts = [*row["zero_shot"], row["fine_tuned"] or {}]
+        values = [row["reachable_share"], *(part.get("success_mean") for part in parts)]
         table.add_row(row["robot"], *("n/a" if value is None else f"{value:.1f}" for value in values))
     console = Console()
     console.print(table)
-    console.print(f"median zero-shot success: {np.median([row['zero_shot']['success_mean'] for row in rows]):.1f} %")
+    for column, name in enumerate(names):
+        median = np.median([row["zero_shot"][column]["success_mean"] for row in rows])
+        console.print(f"median zero-shot success: {median:.1f} %, {name}")
 
 
 if __name__ == "__main__":

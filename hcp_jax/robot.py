@@ -1,4 +1,4 @@
-"""`python -m hcp_jax.robot check FILE [--base LINK] [--tip LINK] [--task reacher] [--json FILE]`: what we make of your arm."""
+"""`python -m hcp_jax.robot check FILE [--base LINK] [--tip LINK] [--policy RUN] [--json FILE]`: what we make of your arm."""
 
 import argparse
 import dataclasses
@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hcp_jax import command_line, presets
+from hcp_jax.config import ArmPoolConfig, ConfigError
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.experiment.arm import make_train_arms
 from hcp_jax.hardware.arm_encodings import encode_arms
@@ -17,6 +18,7 @@ from hcp_jax.hardware.catalogue import catalogue_names, load_robot
 from hcp_jax.hardware.own_arm import compare_with, find_nearest, make_own_pool
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.robot_file import RobotFile
+from hcp_jax.training.run_folder import read_config
 
 OWN_ARM = f"your arm, a URDF or MJCF file (see hcp_jax.robot check), or one of {', '.join(catalogue_names())}"
 
@@ -30,13 +32,16 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("action", choices=["check"])
     parser.add_argument("file", help=f"URDF or MJCF, meshes may be missing; or one of {', '.join(catalogue_names())}")
     add_chain_options(parser)
-    parser.add_argument("--task", choices=list(CHAIN_TEMPLATES), default="reacher", help="whose training arms to compare with")
+    parser.add_argument("--policy", type=pathlib.Path, help="run or published policy whose training arms to compare with")
+    parser.add_argument("--task", choices=list(CHAIN_TEMPLATES), default="reacher", help="else the paper's arms, of this task")
     parser.add_argument("--json", type=pathlib.Path, help="file to write all of it to")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
         robot = load_robot(options.file, options.base, options.tip)
-        own = make_own_pool(options.task, robot)
-        trained = make_train_arms(presets.arm("trained", options.task, "none"))
+        config = read_config(options.policy) if options.policy else presets.arm("trained", options.task, "none")
+        if not isinstance(config.pool, ArmPoolConfig) or config.robot:
+            raise ConfigError(f"--policy={options.policy}: expected one that was trained on types of arms")
+        own, trained = make_own_pool(config.task, robot), make_train_arms(config)
         record = describe(robot, own, trained)
         print_record(record)
         if options.json:

@@ -13,6 +13,7 @@ from hcp_jax.config import Config, ConfigError, field_names, from_dict, to_dict
 EXPERIMENTS = pathlib.Path(__file__).resolve().parents[1] / "experiments"
 HOPPER = str(EXPERIMENTS / "hopper_ppo.py")
 REACHER = str(EXPERIMENTS / "reacher_hcpe_leave_h.py")
+PEG = str(EXPERIMENTS / "peg_hcpe_leave_h.py")
 FINETUNE = str(EXPERIMENTS / "finetune.py")
 
 
@@ -70,6 +71,14 @@ BAD_ARGUMENTS = {
     "an arm that holds a peg": (
         ["--config", REACHER, "--config.pool.left_out=('K',)"],
         "pool.types='K': expected types A to I",
+    ),
+    "a random chain with a peg": (
+        ["--config", PEG, "--config.pool.types=('R7',)"],
+        "pool.types='R7': expected types A to K for peg_insertion",
+    ),
+    "reversed range of random chains": (
+        ["--config", REACHER, "--config.pool.chain_ranges.reach=(2.0,1.0)"],
+        "chain_ranges.reach=(2.0, 1.0): low is above high",
     ),
     "buffer of less than a batch": (
         ["--config", REACHER, "--config.ddpg.buffer_episodes=100"],

@@ -3,14 +3,15 @@
 import dataclasses
 
 from hcp_jax.config.checks import is_at_least_zero, is_positive, require
-from hcp_jax.hardware.arm import TYPES
+from hcp_jax.hardware.arm import ALL_TYPES
 from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS
-from hcp_jax.hardware.ranges import ArmRanges
+from hcp_jax.hardware.ranges import ArmRanges, ChainRanges
 from hcp_jax.physics.base import INTEGRATORS
 
-ARM_CONDITIONINGS = (*ARM_ENCODINGS, "chain_fk", "chain_fk+jacobian", "none+end_effector", "none+goal_offset", "embedding")
+_OF_POSES = ("chain_fk", "chain_fk+jacobian", "chain_fk+jacobian+dynamics", "none+end_effector", "none+goal_offset")
+ARM_CONDITIONINGS = (*ARM_ENCODINGS, *_OF_POSES, "embedding")
 # Those that do not depend on what other arms are trained on (dynamics are scaled by the pool's ranges).
-OWN_ARM_CONDITIONINGS = ("none", "chain", "chain_fk", "chain_fk+jacobian", "none+end_effector", "none+goal_offset")
+OWN_ARM_CONDITIONINGS = ("none", "chain", *_OF_POSES)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,7 +27,8 @@ class ArmPoolConfig:
             episodes of it in an evaluation.
         seed: seed of the robots' hardware.
         split: `train`, or `new` for robots that no other pool of this seed contains (fine-tuning).
-        ranges: where the hardware is drawn from.
+        ranges: where the hardware of types A to K, and of variants of an arm from a file, is drawn from.
+        chain_ranges: where random chains, types R4 to R7, are drawn from.
     """
 
     types: tuple[str, ...] = tuple("ABCDEFGI")
@@ -36,12 +38,13 @@ class ArmPoolConfig:
     seed: int = 0
     split: str = "train"
     ranges: ArmRanges = ArmRanges()
+    chain_ranges: ChainRanges = ChainRanges()
 
     def __post_init__(self):
         for field in ("types", "left_out"):
             value = getattr(self, field)
             for name in value:
-                require(name in TYPES, f"pool.{field}", name, f"types out of {', '.join(TYPES)}")
+                require(name in ALL_TYPES, f"pool.{field}", name, f"types out of {', '.join(ALL_TYPES)}")
             require(len(set(value)) == len(value), f"pool.{field}", value, "no type twice")
         for field in ("robots_per_type", "heldout_per_type"):
             require(getattr(self, field) >= 1, f"pool.{field}", getattr(self, field), "at least 1")

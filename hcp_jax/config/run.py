@@ -8,7 +8,7 @@ from hcp_jax.config.ddpg import DDPGConfig
 from hcp_jax.config.embedding import EmbeddingConfig
 from hcp_jax.config.hopper import HopperConfig, PoolConfig
 from hcp_jax.config.ppo import PPOConfig
-from hcp_jax.hardware.arm import OTHER_ARMS
+from hcp_jax.hardware.arm import CHAIN_TYPES, OTHER_ARMS
 from hcp_jax.hardware.encodings import ENCODINGS
 from hcp_jax.physics.base import PHYSICS
 
@@ -30,8 +30,8 @@ class Config:
         num_envs: parallel environments; 0 stands for the number of training robots.
         physics: `auto`, `mjx-warp`, `mjx-jax` or `native`.
         encoding: v_h. Hopper: `none`, `kinematics`, `kinematics+dynamics`, `random` or `embedding`; arms: `none`, `chain`,
-            `chain_fk`, `chain_fk+jacobian`, `dynamics`, `chain+dynamics`, `random`, `embedding`, `none+end_effector` or
-            `none+goal_offset`.
+            `chain_fk`, `chain_fk+jacobian`, `chain_fk+jacobian+dynamics`, `dynamics`, `chain+dynamics`, `random`, `embedding`,
+            `none+end_effector` or `none+goal_offset`.
         eval_every: control steps between evaluations, which also write a checkpoint; rounded to whole iterations.
         eval_robots: hoppers of the training pool, and at most as many held-out ones, in an evaluation.
         keep_checkpoints: newest checkpoints kept beside the best one.
@@ -106,9 +106,12 @@ class Config:
             require(len(pool.types) >= 1, "pool.types", pool.types, "at least 1 type, or an arm's file in robot")
         if self.task == "reacher":
             for name in (*pool.types, *pool.left_out):
-                require(name not in OTHER_ARMS, "pool.types", name, "types A to I for the reacher (J and K hold a peg)")
+                require(name not in OTHER_ARMS, "pool.types", name, "types A to I, R4 to R7 for the reacher (J, K hold a peg)")
             assert isinstance(self.env, ArmConfig)
             require(self.env.approach_starts == 0, "env.approach_starts", self.env.approach_starts, "0 for the reacher")
+        else:
+            for name in (*pool.types, *pool.left_out):
+                require(name not in CHAIN_TYPES, "pool.types", name, "types A to K for peg_insertion")
 
     def _check_ppo(self) -> None:
         batch = self.batch_size

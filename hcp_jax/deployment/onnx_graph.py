@@ -119,6 +119,7 @@ _SAME = {
     "sin": "Sin",
     "cos": "Cos",
     "exp": "Exp",
+    "log": "Log",
     "sqrt": "Sqrt",
     "tanh": "Tanh",
     "asinh": "Asinh",

@@ -9,12 +9,12 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 
+from hcp_jax.hardware.start_poses import REACHER_GOALS
+
 CTRL_DT = 0.02  # [s]
 MAX_JOINTS = 7
 NUM_SUBSTEPS = {"rk4": 20, "implicitfast": 5, "euler": 20}
-# [m] Boxes of goals: low and high corner.
-REACHER_GOALS = ((0.3, -0.3, -0.1), (0.6, 0.3, 0.3))
-HOLE = (0.6, 0.0, 0.0)  # of peg insertion: the target of the peg's bottom, 0.05 m below the table top
+HOLE = (0.6, 0.0, 0.0)  # [m] of peg insertion: the target of the peg's bottom, 0.05 m below the table top
 TARGET_ABOVE_TABLE = 0.1  # [m] the target above the origin of the template's table
 
 

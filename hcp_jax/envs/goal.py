@@ -3,6 +3,7 @@
 The contract, each sentence a test:
 - An episode does not end at success: success is a flag of each step, terminal for the learner alone.
 - Noise is on the observation; the achieved goal is where the point of interest is.
+- Joint velocities are observed up to `MAX_SPEED`: an arm whose physics is about to diverge spoils no statistics.
 - A world whose physics is not plausible stays where it was last, and says so.
 - Actions of missing joints are 0 and cost nothing.
 - Where the task asks for approach starts, that share of episodes starts from the pool's `approach_angles`, with the goals that
@@ -75,6 +76,11 @@ class GoalTask(Protocol):
 
 # What a pool's hardware has for approach starts: joint angles [N, K, 7] rad and their goals [N, K, 3] m.
 APPROACH = ("approach_angles", "approach_goal")
+
+
+# [rad/s] Faster joints are seen as that fast. One run's inputs were whitened by a standard deviation of 1e5 rad/s after a few
+# episodes of arms whose physics diverged, and its success fell from 93 to 18 %.
+MAX_SPEED = 100.0
 
 
 class GoalEnv:
@@ -152,7 +158,7 @@ class GoalEnv:
 
     def _observe(self, physics: PhysicsState, index: jax.Array, key: jax.Array) -> jax.Array:
         """Noisy joint angles and velocities, 0 for missing joints: [B, 14]."""
-        state = jnp.concatenate([physics.qpos, physics.qvel], axis=-1)
+        state = jnp.concatenate([physics.qpos, jnp.clip(physics.qvel, -MAX_SPEED, MAX_SPEED)], axis=-1)
         noise = jax.random.uniform(key, state.shape, minval=-1.0, maxval=1.0) * self.task.observation_noise
         return (state + noise) * jnp.tile(self._joint_mask[index], 2)
 

@@ -14,7 +14,7 @@ from hcp_jax.evaluation.records import QUANTILES
 from hcp_jax.evaluation.statistics import describe_evaluation
 from hcp_jax.experiment.arm import ArmExperiment, load_own_robot, make_evaluator, make_heldout_arms
 from hcp_jax.experiment.build import make_experiment
-from hcp_jax.hardware.arm import TYPES, type_name
+from hcp_jax.hardware.arm import ALL_TYPES, type_name
 from hcp_jax.hardware.inverse_kinematics import is_reachable
 from hcp_jax.hardware.own_arm import make_own_pool
 from hcp_jax.hardware.pool import RobotPool
@@ -110,7 +110,7 @@ def evaluate_type(
     """One episode of each robot of `pool` in order, all of them before any twice: their summary, and a row for each."""
     config = run.config
     evaluator = make_evaluator(config, run.learner, run.make_env, pool, run.train_pool)
-    number = TYPES.index(name) if name in TYPES else len(TYPES)
+    number = ALL_TYPES.index(name) if name in ALL_TYPES else len(ALL_TYPES)
     key_play, key_goal = jax.random.split(jax.random.fold_in(jax.random.key(seed), number))
     index = np.arange(trials * robots_per_trial) % pool.num_robots
     episodes = evaluator(run.learner.policy(state), index, key_play)

@@ -1,4 +1,4 @@
-"""The catalogue's arms beside each other: what a policy reaches on each without training, and after fine-tuning on it."""
+"""The catalogue's arms beside each other: what policies reach on each without training, and after fine-tuning on it."""
 
 import pathlib
 from collections.abc import Sequence
@@ -10,41 +10,43 @@ from hcp_jax.training.run_folder import read_config
 
 
 def make_catalogue_table(
-    policy: pathlib.Path,
+    policies: Sequence[pathlib.Path],
     fine_tuned: Sequence[pathlib.Path] = (),
     trials: int = 10,
     episodes_per_trial: int = 100,
     names: Sequence[str] = (),
     physics: str = "auto",
 ) -> list[dict]:
-    """Plays a policy on every arm of the catalogue, with the same goals, and each fine-tuned run on its own arm.
+    """Plays policies on every arm of the catalogue, with the same goals, and each fine-tuned run on its own arm.
 
     Args:
-        policy: a run folder or a published policy of arms.
+        policies: run folders or published policies of arms.
         fine_tuned: run folders of `experiments/finetune.py`, at most one for each arm.
         trials, episodes_per_trial: numbers of trials and of episodes in each.
         names: arms of the catalogue; by default all.
         physics: engine, may be `native-INTEGRATOR`.
 
     Returns:
-        one row per arm, in alphabetical order: robot, joints, reachable_share of the goals, zero_shot and fine_tuned (None
-        without such a run), trials, episodes_per_trial, physics, commit. The two hold success_mean and success_std over trials,
-        reachable_success_mean, policy and control_steps. Success and shares in percent.
+        one row per arm, in alphabetical order: robot, joints, reachable_share of the goals, zero_shot (a list, as
+        `policies`) and fine_tuned (None without such a run), trials, episodes_per_trial, physics, commit. Each of the two
+        holds success_mean and success_std over trials, reachable_success_mean, policy and control_steps. Success and shares
+        in percent.
 
     Raises:
-        ConfigError: the policy is of hoppers, an arm is not in the catalogue, a run was not trained on one of them, or two runs
+        ConfigError: a policy is of hoppers, an arm is not in the catalogue, a run was not trained on one of them, or two runs
             were on the same.
         RunFolderError, CheckpointError: a policy cannot be read.
     """
-    if read_config(policy).task == "hopper":
-        raise ConfigError(f"{policy}: a policy of hoppers; expected one of arms")
+    for policy in policies:
+        if read_config(policy).task == "hopper":
+            raise ConfigError(f"{policy}: a policy of hoppers; expected one of arms")
     names = sorted(names or catalogue_names())
     for name in names:
         if name not in catalogue_names():
             raise ConfigError(f"--robots={name}: expected arms out of {', '.join(catalogue_names())}")
     runs = group_by_robot(fine_tuned)
     robots = {name: load_robot(name) for name in names}
-    zero_shot = evaluate_arms(policy, trials, episodes_per_trial, physics=physics, own_robots=robots)
+    records = [evaluate_arms(policy, trials, episodes_per_trial, physics=physics, own_robots=robots) for policy in policies]
     rows = []
     for name in names:
         tuned = None
@@ -53,12 +55,12 @@ def make_catalogue_table(
         row = {
             "robot": name,
             "joints": robots[name].chain.num_joints,
-            "reachable_share": round(zero_shot["types"][name]["reachable_share"], 2),
-            "zero_shot": summarise(zero_shot, name),
+            "reachable_share": round(records[0]["types"][name]["reachable_share"], 2),
+            "zero_shot": [summarise(record, name) for record in records],
             "fine_tuned": tuned,
         }
-        rows.append(row | {"trials": trials, "episodes_per_trial": episodes_per_trial, "physics": zero_shot["physics"]})
-    return [row | {"commit": zero_shot["commit"]} for row in rows]
+        rows.append(row | {"trials": trials, "episodes_per_trial": episodes_per_trial, "physics": records[0]["physics"]})
+    return [row | {"commit": records[0]["commit"]} for row in rows]
 
 
 def group_by_robot(folders: Sequence[pathlib.Path]) -> dict[str, pathlib.Path]:

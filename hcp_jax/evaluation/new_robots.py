@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from hcp_jax.config import Config, ConfigError, from_dict, to_dict, unknown_field
 from hcp_jax.experiment.chosen_robots import heldout_kinds
+from hcp_jax.hardware.arm import CHAIN_TYPES
 from hcp_jax.hardware.pool import RobotPool
 
 RangeChange = tuple[str, float, float]  # name, low, high
@@ -21,10 +22,13 @@ def check_types(config: Config, types: Sequence[str]) -> None:
 def change_ranges(config: Config, changes: Sequence[RangeChange]) -> Config:
     """`config` with other ranges of hardware. Raises ConfigError or RangeError."""
     values = to_dict(config)
-    ranges = values["pool"]["ranges"]
+    pool = values["pool"]
+    # Random chains have ranges of their own, some under the names of the others'; a run draws from one kind.
+    ranges = pool["chain_ranges"] if set(pool.get("types", ())) & set(CHAIN_TYPES) else pool["ranges"]
+    known = sorted(name for name, bounds in ranges.items() if not isinstance(bounds, float))
     for name, low, high in changes:
-        if name not in ranges:
-            raise ConfigError(unknown_field(f"--range {name}", sorted(ranges)))
+        if name not in known:
+            raise ConfigError(unknown_field(f"--range {name}", known))
         ranges[name] = (low, high)
     return from_dict(Config, values)
 

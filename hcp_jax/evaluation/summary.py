@@ -20,6 +20,7 @@ ALGORITHM_NAMES = {
     "chain_fk": "HCP-E",
     "chain_fk+jacobian": "HCP-E",
     "chain+dynamics": "HCP-E+Dyn",
+    "chain_fk+jacobian+dynamics": "HCP-E+Dyn",
     "embedding": "HCP-I",
 }
 RETURNS = ("train_return", "heldout_return", "heldout_fitted_return")

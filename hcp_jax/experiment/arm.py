@@ -154,14 +154,15 @@ def make_train_arms(config: Config) -> RobotPool:
     """The arms that are trained on, `pool.robots_per_type` of each of `pool.types`."""
     pools = config.pool
     assert isinstance(pools, ArmPoolConfig)
-    return make_arm_pool(config.task, pools.ranges, pools.types, pools.robots_per_type, pools.seed, pools.split)
+    drawn = (pools.types, pools.robots_per_type, pools.seed, pools.split, pools.chain_ranges)
+    return make_arm_pool(config.task, pools.ranges, *drawn)
 
 
 def make_heldout_arms(config: Config, types: tuple[str, ...], num_per_type: int) -> RobotPool:
     """Held-out robots 0..num_per_type-1 of each of `types`: no training pool of this seed contains them."""
     pools = config.pool
     assert isinstance(pools, ArmPoolConfig)
-    return make_arm_pool(config.task, pools.ranges, types, num_per_type, pools.seed, "heldout")
+    return make_arm_pool(config.task, pools.ranges, types, num_per_type, pools.seed, "heldout", pools.chain_ranges)
 
 
 def load_own_robot(config: Config) -> RobotFile:

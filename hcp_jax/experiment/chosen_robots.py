@@ -56,7 +56,8 @@ def heldout_kinds(config: Config) -> tuple[str, ...]:
     """What the task has held-out robots of."""
     if config.task == "hopper":
         return ("hopper",)
-    return tuple(name for name in arm.TYPES if config.task != "reacher" or name not in arm.OTHER_ARMS)
+    others = arm.OTHER_ARMS if config.task == "reacher" else arm.CHAIN_TYPES
+    return tuple(name for name in arm.ALL_TYPES if name not in others)
 
 
 def check_choice(config: Config, choice: Choice, kinds: Sequence[str], option: str) -> None:
@@ -113,6 +114,6 @@ def _joint_names(run: ArmExperiment | HopperExperiment, pool: RobotPool) -> tupl
     if isinstance(run, HopperExperiment):
         return hopper.JOINTS
     number = int(pool.hardware["type"][0, 0])
-    if number < 0:  # somebody's arm that was trained on
+    if not 0 <= number < len(arm.TYPES):  # somebody's arm that was trained on, or a random chain
         return tuple(f"joint {slot}" for slot in range(int(pool.hardware["joint_mask"][0].sum())))
     return tuple(joint for joint in arm.JOINTS if joint not in arm.REMOVED_JOINTS[arm.TYPES[number]])

@@ -25,6 +25,9 @@ REMOVED_JOINTS = {
     "K": (),
 }
 TYPES = tuple(REMOVED_JOINTS)
+# Types that are drawn joint by joint (`hcp_jax.hardware.random_chain`): how many joints each has. For the reacher.
+CHAIN_TYPES = {"R4": 4, "R5": 5, "R6": 6, "R7": 7}
+ALL_TYPES = (*TYPES, *CHAIN_TYPES)  # in the order of a pool's type numbers
 OWN_TYPE = "own"  # an arm from a file: type number -1
 ARM_TEMPLATES = {"reacher": "arm_reacher.xml", "peg_insertion": "arm_peg.xml"}
 # Types of another template, which hold a peg: of peg insertion alone.
@@ -60,7 +63,7 @@ Hardware = dict[str, np.ndarray]
 
 def type_name(number: float) -> str:
     """The type that a pool's hardware `type` stands for."""
-    return OWN_TYPE if number < 0 else TYPES[int(number)]
+    return OWN_TYPE if number < 0 else ALL_TYPES[int(number)]
 
 
 def sample_hardware(ranges: ArmRanges, robot_type: str, num_robots: int, seed: int, split: str = "train") -> Hardware:

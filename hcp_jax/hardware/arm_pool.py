@@ -9,10 +9,11 @@ from collections.abc import Iterator, Sequence
 import mujoco
 import numpy as np
 
-from hcp_jax.hardware.arm import TYPES, arm_spec, sample_hardware
+from hcp_jax.hardware.arm import ALL_TYPES, CHAIN_TYPES, arm_spec, sample_hardware
 from hcp_jax.hardware.chain import MAX_JOINTS, Chain, edit_spec, read_chain
 from hcp_jax.hardware.pool import RobotPool, robots_path, stack_models
-from hcp_jax.hardware.ranges import SPLIT_STRIDE, SPLITS, ArmRanges
+from hcp_jax.hardware.random_chain import sample_reaching_chains
+from hcp_jax.hardware.ranges import SPLIT_STRIDE, SPLITS, ArmRanges, ChainRanges
 from hcp_jax.hardware.start_poses import start_angles
 
 CHAIN_TEMPLATES = {"reacher": "chain_reacher.xml", "peg_insertion": "chain_peg.xml"}
@@ -22,19 +23,40 @@ _HARDWARE = ("joint_range", "torque_limit", "damping", "frictionloss", "armature
 
 
 def make_arm_pool(
-    task: str, ranges: ArmRanges, types: Sequence[str], num_per_type: int, seed: int, split: str = "train"
+    task: str,
+    ranges: ArmRanges,
+    types: Sequence[str],
+    num_per_type: int,
+    seed: int,
+    split: str = "train",
+    chain_ranges: ChainRanges | None = None,
 ) -> RobotPool:
-    """Samples, compiles and stacks `num_per_type` arms of each of `types`, in that order."""
+    """Samples, compiles and stacks `num_per_type` arms of each of `types`, in that order: random chains from `chain_ranges` (by
+    default `ChainRanges()`), the others from `ranges`."""
     chains, ids, numbers, starts = [], [], [], []
     for robot_type in types:
-        hardware = sample_hardware(ranges, robot_type, num_per_type, seed, split)
-        variants = [{name: values[robot] for name, values in hardware.items()} for robot in range(num_per_type)]
-        chains += [read_chain(arm_spec(task, robot_type, variant).compile()) for variant in variants]
-        number = TYPES.index(robot_type)
+        number = ALL_TYPES.index(robot_type)
+        if robot_type in CHAIN_TYPES:
+            seeds = [seed, SPLITS[split], number]
+            drawn, angles = sample_reaching_chains(chain_ranges or ChainRanges(), CHAIN_TYPES[robot_type], num_per_type, seeds)
+            chains += drawn
+        else:
+            chains += sample_arms(task, ranges, robot_type, num_per_type, seed, split)
+            angles = np.tile(start_angles(task, robot_type), (num_per_type, 1, 1))
         ids.append(SPLITS[split] * SPLIT_STRIDE + number * TYPE_STRIDE + np.arange(num_per_type))
         numbers += [number] * num_per_type
-        starts += [start_angles(task, robot_type)] * num_per_type
-    return make_chain_pool(CHAIN_TEMPLATES[task], chains, np.concatenate(ids), np.asarray(numbers), np.stack(starts))
+        starts.append(angles)
+    # As many start poses for all: those of arms that have fewer come more than once.
+    most = max(angles.shape[1] for angles in starts)
+    starts = [angles[:, np.arange(most) % angles.shape[1]] for angles in starts]
+    return make_chain_pool(CHAIN_TEMPLATES[task], chains, np.concatenate(ids), np.asarray(numbers), np.concatenate(starts))
+
+
+def sample_arms(task: str, ranges: ArmRanges, robot_type: str, count: int, seed: int, split: str) -> list[Chain]:
+    """Variants 0 to count - 1 of one of the paper's types."""
+    hardware = sample_hardware(ranges, robot_type, count, seed, split)
+    variants = [{name: values[robot] for name, values in hardware.items()} for robot in range(count)]
+    return [read_chain(arm_spec(task, robot_type, variant).compile()) for variant in variants]
 
 
 def make_chain_pool(
@@ -44,14 +66,15 @@ def make_chain_pool(
 
     Its `hardware` has, with zeros for missing joints: chain_pos [N, 8, 3] m and chain_quat [N, 8, 4], the frame of each joint
     in that of the one before, then of the point of interest in the last joint's; joint_mask [N, 7]; joint_range [N, 7, 2] rad;
-    torque_limit [N, 7] N m; link_mass [N, 7] kg; damping, frictionloss, armature [N, 7]; type [N, 1], a position in `TYPES`;
-    start_angles [N, S, 7] rad, as given.
+    torque_limit [N, 7] N m; link_mass [N, 7] kg and link_com [N, 7, 3] m, its centre in the joint's frame; damping,
+    frictionloss, armature [N, 7]; type [N, 1], a position in `ALL_TYPES`; start_angles [N, S, 7] rad, as given.
     """
     hardware = {name: np.stack([chain.padded(name) for chain in chains]) for name in _HARDWARE}
     hardware |= {
         "chain_pos": np.stack([chain.padded("pos") for chain in chains]),
         "chain_quat": np.stack([chain.padded("quat") for chain in chains]),
         "joint_mask": np.asarray([np.arange(MAX_JOINTS) < chain.num_joints for chain in chains], np.float64),
+        "link_com": np.stack([chain.padded("com") for chain in chains]),
         "link_mass": np.stack([chain.padded("mass") for chain in chains]),
         "type": np.asarray(robot_type, np.float64)[:, None],
         "start_angles": np.asarray(start_angles, np.float64),

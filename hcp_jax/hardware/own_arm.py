@@ -3,22 +3,20 @@
 import dataclasses
 import itertools
 
-import jax
 import numpy as np
 
-from hcp_jax.hardware.arm import TYPES, sample_hardware
+from hcp_jax.hardware.arm import ALL_TYPES, sample_hardware
 from hcp_jax.hardware.arm_encodings import encode_arms
 from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES, make_chain_pool
 from hcp_jax.hardware.chain import MAX_JOINTS, Chain
-from hcp_jax.hardware.inverse_kinematics import NUM_STARTS, solve_positions
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.ranges import ArmRanges
+from hcp_jax.hardware.reaching import MAX_ERROR, reach_points
 from hcp_jax.hardware.robot_file import RobotFile, RobotFileError
 from hcp_jax.hardware.start_poses import GRID
 
 OWN_ID = 9_000_000  # above those of every split
-_MAX_ERROR = 0.01  # [m] of a start pose from its point
-_START_SPREADS = (0.1, 0.3, 1.0, np.pi)  # [rad] about 0, of the joints that the search for start poses begins at
+_NUM_SAMPLES, _NUM_STARTS = 4096, 8  # of the search for start poses
 _LEAST_SPREAD = 0.05  # [m], [rad] of an entry that hardly differs among the training arms
 SCALARS = ("torque_limit", "link_mass", "damping", "frictionloss", "armature")
 
@@ -47,25 +45,14 @@ def make_own_pool(task: str, robot: RobotFile) -> RobotPool:
     Raises:
         RobotFileError: it reaches no point that the reacher starts from.
     """
-    joint_range = robot.chain.padded("joint_range")
-    zero = np.clip(np.zeros(MAX_JOINTS), *joint_range.T)
-    pool = _make_pool(task, [robot.chain], zero[None])
     if task == "peg_insertion":
-        return pool
+        return _make_pool(task, [robot.chain], np.clip(np.zeros((1, MAX_JOINTS)), *robot.chain.padded("joint_range").T))
     points = np.asarray(list(itertools.product(*GRID)))
-    repeated, rng = pool.subset(np.zeros(len(points), int)), np.random.default_rng(0)
-    distance, angles = np.full(len(points), np.inf), np.zeros((len(points), MAX_JOINTS))
-    for spread in _START_SPREADS:
-        starts = zero + spread * rng.uniform(-1.0, 1.0, (len(points), NUM_STARTS, MAX_JOINTS))
-        solution = solve_positions(repeated, points, jax.random.key(0), starts=np.clip(starts, *joint_range.T))
-        better = (distance >= _MAX_ERROR) & (solution.distance < distance)
-        distance[better], angles[better] = solution.distance[better], solution.angles[better]
-        if (distance < _MAX_ERROR).all():
-            break
-    reached = distance < _MAX_ERROR
+    angles, distance = reach_points([robot.chain], points[None], seed=0, num_samples=_NUM_SAMPLES, num_starts=_NUM_STARTS)
+    reached = distance[0] < MAX_ERROR
     if not reached.any():
         raise RobotFileError(f"reaches no point that the reacher starts from; it comes within {distance.min():.2f} m of one")
-    return _make_pool(task, [robot.chain], angles[reached])
+    return _make_pool(task, [robot.chain], angles[0][reached])
 
 
 def make_own_variants(task: str, robot: RobotFile, ranges: ArmRanges, count: int, seed: int) -> RobotPool:
@@ -117,4 +104,4 @@ def find_nearest(own: RobotPool, trained: RobotPool) -> tuple[str, int, float]:
     scaled = (reference - encoded) / np.maximum(reference.std(axis=0), _LEAST_SPREAD)
     distance = np.sqrt(np.mean(np.square(scaled), axis=1))
     row = int(np.argmin(distance))
-    return TYPES[int(trained.hardware["type"][row, 0])], int(trained.robot_id[row]), float(distance[row])
+    return ALL_TYPES[int(trained.hardware["type"][row, 0])], int(trained.robot_id[row]), float(distance[row])

@@ -76,6 +76,11 @@ class HopperRanges:
             check_range(f"ranges.{field.name}", getattr(self, field.name), minimum=1e-3 if positive else 0.0)
 
 
+def sample_logarithmic(rng: np.random.Generator, bounds: Range) -> float:
+    """Draws from `bounds`, above 0, uniformly in the logarithm."""
+    return float(np.exp(sample_uniform(rng, (np.log(bounds[0]), np.log(bounds[1])))))
+
+
 @dataclasses.dataclass(frozen=True)
 class ArmRanges:
     """Ranges of the arm pool (paper, appendix, table "Manipulator Parameters").
@@ -103,6 +108,93 @@ class ArmRanges:
         for field in dataclasses.fields(self):
             minimum = SHORTEST_LINK_CHANGE if field.name.startswith("l") else 1e-3 if field.name == "mass_ratio" else 0.0
             check_range(f"ranges.{field.name}", getattr(self, field.name), minimum)
+
+
+# Of the entries of `ChainRanges` that may be 0 or below; the others are logarithmic, or a size.
+_LEAST = {
+    "tool": 0.0,
+    "frictionloss": 0.0,
+    "link_offset": -1.0,
+    "base_height": -1.0,
+    "base_offset": -1.0,
+    "com_offset": -1.0,
+    "one_sided_end": -1.0,
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class ChainRanges:
+    """Ranges of random chains. Chosen to enclose every entry of every arm in `robots/catalogue/` (a test compares them).
+
+    Attributes:
+        parallel_share: of the joints from the third on, whose axis is parallel to the one before (UR arms); others are at right
+            angles to it.
+        reach: lengths of the links between first and last joint together [m].
+        coincident_share: of the links without length (spherical shoulders and wrists).
+        longest_link: [m].
+        tool: from the last joint to the point of interest [m].
+        link_offset: a joint's offset [m] beside its link, in each of two directions, where it has one.
+        base_height, base_offset: of the first joint [m], upwards and in each horizontal direction, where it has one.
+        offset_share: of the offsets that are not 0.
+        mass: [kg] of a first link; the last weighs `last_mass` of it, those between are in line.
+        mass_ratio: factor on each link's mass.
+        last_mass: see `mass`.
+        com_offset: a centre of mass beside its link [m], in each direction.
+        radius: of the cylinders whose inertias links have [m], times `inertia_ratio`.
+        inertia_ratio: see `radius`.
+        torque_margin: torque limits as multiples of what holds the arm stretched out level.
+        smallest_torque: no motor of an arm is weaker [N m].
+        largest_torque: nor stronger [N m].
+        damping: [N m s/rad], drawn in the logarithm like masses, torques and armatures.
+        frictionloss: [N m] of the `friction_share` of arms that have any.
+        friction_share: see `frictionloss`.
+        resistance: friction loss, and damping at 1 rad/s, are at most this share of a joint's torque limit.
+        armature: [kg m^2].
+        joint_range: how far joints turn to each side [rad]. `turning_share` of the joints turn by pi or 2 pi to both, and
+            `one_sided_share` from `one_sided_end` over `one_sided_width` or the mirror image of that (elbows).
+        turning_share, one_sided_share, one_sided_end, one_sided_width: see `joint_range`.
+    """
+
+    parallel_share: float = 0.25
+    reach: Range = (0.65, 1.35)
+    coincident_share: float = 0.25
+    longest_link: float = 0.65
+    tool: Range = (0.0, 0.2)
+    link_offset: Range = (-0.18, 0.18)
+    base_height: Range = (0.05, 0.4)
+    base_offset: Range = (-0.13, 0.13)
+    offset_share: float = 0.4
+    mass: Range = (0.8, 10.0)
+    mass_ratio: Range = (0.4, 2.0)
+    last_mass: float = 0.25
+    com_offset: Range = (-0.05, 0.05)
+    radius: Range = (0.03, 0.08)
+    inertia_ratio: Range = (0.5, 2.5)
+    torque_margin: Range = (1.0, 6.0)
+    smallest_torque: Range = (7.0, 60.0)
+    largest_torque: float = 350.0
+    damping: Range = (0.3, 15.0)
+    frictionloss: Range = (0.0, 6.0)
+    friction_share: float = 0.5
+    resistance: float = 0.7
+    armature: Range = (0.08, 0.5)
+    joint_range: Range = (1.2, 5.0)
+    turning_share: float = 0.3
+    one_sided_share: float = 0.2
+    one_sided_end: Range = (-0.3, 0.3)
+    one_sided_width: Range = (2.5, 4.5)
+
+    def __post_init__(self):
+        for name, value in dataclasses.asdict(self).items():
+            if name.endswith("_share"):
+                if not 0.0 <= value <= 1.0:
+                    raise RangeError(f"chain_ranges.{name}={value}: expected a number in [0, 1]")
+            elif not isinstance(value, tuple):
+                check_range(f"chain_ranges.{name}", (value, value), minimum=1e-3)
+            else:
+                check_range(f"chain_ranges.{name}", value, _LEAST.get(name, 1e-3))
+        if self.turning_share + self.one_sided_share > 1.0:
+            raise RangeError(f"chain_ranges.one_sided_share={self.one_sided_share}: above 1 with turning_share")
 
 
 def nominal_lengths(ranges: ArmRanges) -> ArmRanges:

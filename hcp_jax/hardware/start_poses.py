@@ -12,6 +12,7 @@ from hcp_jax.hardware.chain import TIP_SITE
 
 # [m] Grid of end-effector positions at the start of the reacher: 4 x 5 x 3 points of a box.
 GRID = (np.linspace(0.3, 0.6, 4), np.linspace(-0.2, 0.2, 5), np.linspace(0.5, 0.7, 3))
+REACHER_GOALS = ((0.3, -0.3, -0.1), (0.6, 0.3, 0.3))  # [m] box of its goals: low and high corner
 _MAX_ERROR = 1e-3  # [m]
 _REST_WEIGHT = 1e-3  # [m/rad] of angles beside the error: of all solutions the one with small angles
 

@@ -5,6 +5,7 @@
 | those of `hcp_jax.hardware.arm_encodings` | as there | a constant of the robot |
 | `chain_fk` | 57 | what `chain` says at the observed joint angles, as the released code feeds it: positions and axes of the joints, position and rotation of the end effector in the world; and its offset from the goal |
 | `chain_fk+jacobian` | 109 | `chain_fk`, and how the joints move the end effector: the velocity of the end effector and of its z axis per rad/s of each joint, the end effector's velocity, and how fast each joint takes it towards the goal |
+| `chain_fk+jacobian+dynamics` | 137 | `chain_fk+jacobian`, and what the motors are up against: for each joint the torque that holds the arm still, damping and friction loss in units of the torque limit, and the logarithm of the acceleration [rad/s^2] that the limit gives |
 | `embedding` | its size | learned with the policy (HCP-I) |
 | `none+end_effector` | 3 | no v_h, but the end effector's position: a control |
 | `none+goal_offset` | 3 | no v_h, but the end effector's offset from the goal: a control |
@@ -22,9 +23,12 @@ from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.policies.conditioning import Embedding
 
-POSE_FEATURES = {"chain_fk": 57, "chain_fk+jacobian": 109, "none+end_effector": 3, "none+goal_offset": 3}
+MOTOR_LOADS = "chain_fk+jacobian+dynamics"
+POSE_FEATURES = {"chain_fk": 57, "chain_fk+jacobian": 109, MOTOR_LOADS: 137, "none+end_effector": 3, "none+goal_offset": 3}
 GOAL_CONDITIONINGS = (*ARM_ENCODINGS, *POSE_FEATURES, "embedding")
 OFFSET_SCALE = 0.02  # [m]
+GRAVITY = 9.81  # [m/s^2]
+_DYNAMICS = ("link_mass", "link_com", "torque_limit", "damping", "frictionloss", "armature")
 
 
 class GoalConditioning:
@@ -52,6 +56,7 @@ class GoalConditioning:
         self._chain_pos = jnp.asarray(pool.hardware["chain_pos"], jnp.float32)
         self._chain_rotation = quat_to_matrix(jnp.asarray(pool.hardware["chain_quat"], jnp.float32))
         self._joint_mask = jnp.asarray(pool.hardware["joint_mask"], jnp.float32)
+        self._dynamics = {name: jnp.asarray(pool.hardware[name], jnp.float32) for name in _DYNAMICS if encoding == MOTOR_LOADS}
         v_h_size = embedding.size if embedding is not None else self._table.shape[1]
         self.size = observation_size + goal_size + v_h_size + POSE_FEATURES.get(encoding, 0)
 
@@ -90,13 +95,43 @@ class GoalConditioning:
         mask = self._joint_mask[index][..., None]
         anchors, axes = positions[..., :-1, :] * mask, rotations[..., :-1, :, 2] * mask
         robot, towards = [anchors, axes, end_effector, rotations[..., -1, :, :]], [offset]
-        if self.encoding == "chain_fk+jacobian":
+        if self.encoding in ("chain_fk+jacobian", MOTOR_LOADS):
             jacobian = jnp.cross(axes, end_effector[..., None, :] - anchors)
             turns = jnp.cross(axes, rotations[..., -1, None, :, 2])
             robot += [jacobian, turns, jnp.einsum("...ij,...i->...j", jacobian, velocities)]
             towards += [jnp.einsum("...ij,...j->...i", jacobian, soft_direction(goal - end_effector))]
+        if self.encoding == MOTOR_LOADS:
+            dynamics = {name: values[index] for name, values in self._dynamics.items()}
+            robot += motor_loads(dynamics, anchors, axes, positions, rotations)
         flat = (*angles.shape[:-1], -1)
         return {"robot": [part.reshape(flat) for part in robot], "goal": towards}
+
+
+def motor_loads(
+    dynamics: dict[str, jax.Array], anchors: jax.Array, axes: jax.Array, positions: jax.Array, rotations: jax.Array
+) -> list[jax.Array]:
+    """What each joint's motor has to overcome, 0 for missing joints: four arrays [..., 7].
+
+    Args:
+        dynamics: rows of a pool's hardware, link_com [..., 7, 3], the others [..., 7].
+        anchors, axes: [..., 7, 3] in the world, 0 for missing joints.
+        positions, rotations: [..., 8, 3], [..., 8, 3, 3] (`joint_poses`).
+
+    Returns:
+        the torque that holds the arm still, damping [s/rad] and friction loss, each over the torque limit; and the logarithm of
+        the limit over the inertia about the joint's axis [1/s^2], links taken as points.
+    """
+    mass, limit = dynamics["link_mass"], dynamics["torque_limit"]
+    is_missing = limit <= 0
+    limit = jnp.where(is_missing, 1.0, limit)
+    com = positions[..., :-1, :] + jnp.einsum("...ij,...j->...i", rotations[..., :-1, :, :], dynamics["link_com"])
+    # How fast the joint on the first axis moves the link on the second: [..., 7, 7, 3]; not those before it.
+    motion = jnp.cross(axes[..., :, None, :], com[..., None, :, :] - anchors[..., :, None, :])
+    motion = motion * jnp.triu(jnp.ones((mass.shape[-1], mass.shape[-1])))[..., None]
+    hold = GRAVITY * jnp.einsum("...ij,...j->...i", motion[..., 2], mass)
+    inertia = jnp.einsum("...ij,...j->...i", jnp.sum(jnp.square(motion), axis=-1), mass) + dynamics["armature"]
+    agility = jnp.log(limit / jnp.where(is_missing, 1.0, inertia))
+    return [jnp.where(is_missing, 0.0, hold / limit), dynamics["damping"] / limit, dynamics["frictionloss"] / limit, agility]
 
 
 def split_joints(inputs: jax.Array) -> tuple[jax.Array, jax.Array]:

@@ -13,7 +13,7 @@ from hcp_jax.envs.arm import CTRL_DT
 from hcp_jax.experiment.arm import ArmExperiment
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.experiment.chosen_robots import heldout_kinds
-from hcp_jax.hardware.arm import LINKS
+from hcp_jax.hardware.arm import LINKS, TYPES
 from hcp_jax.rendering.drawing import ARM_FLOOR, GOAL_GEOMS, OPEN_GOAL, REACHED_GOAL, make_drawing, put_goal
 from hcp_jax.rendering.graphics import GraphicsError
 from hcp_jax.rendering.live import LiveArm
@@ -69,7 +69,7 @@ class ArmView:
         self._within = run.config.env.success_distance
         self._rebuild_at, self._asks_pose, self._asked_goal = math.inf, False, None
         self.shapes, self._num_ticks = {}, 0
-        self._add_controls(heldout_kinds(run.config), run.config.pool)
+        self._add_controls([kind for kind in heldout_kinds(run.config) if kind in TYPES], run.config.pool)
         self._rebuild()
         self.gizmo = server.scene.add_transform_controls(
             "/goal", scale=0.15, disable_rotations=True, disable_sliders=True, position=self.arm.goal

@@ -14,6 +14,7 @@ from hcp_jax.experiment.build import make_experiment
 from hcp_jax.experiment.chosen_robots import TRAINED, Choice, check_choice, heldout_kinds, make_chosen_pool
 from hcp_jax.experiment.hopper import HopperExperiment, heldout_v_h, train_v_h
 from hcp_jax.experiment.hopper import make_evaluator as make_hopper_evaluator
+from hcp_jax.hardware.arm import CHAIN_TYPES
 from hcp_jax.hardware.own_arm import make_own_pool
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.robot_file import RobotFile
@@ -87,9 +88,11 @@ def record_episodes(
 
 
 def default_robots(config: Config) -> list[Choice]:
-    """The first held-out robot of every type that the task has; of hoppers the first nine."""
+    """The first held-out robot of every type that the task has, of random chains where they are trained on; of hoppers nine."""
     rows = range(_NUM_HOPPERS if config.task == "hopper" else 1)
-    return [Choice(kind, row) for kind in heldout_kinds(config) for row in rows]
+    trained = config.pool.types if isinstance(config.pool, ArmPoolConfig) else ()
+    kinds = [kind for kind in heldout_kinds(config) if kind not in CHAIN_TYPES or kind in trained]
+    return [Choice(kind, row) for kind in kinds for row in rows]
 
 
 def check_robots(config: Config, robots: Sequence[Choice]) -> None:

@@ -20,6 +20,7 @@ COLOURS = {
     "chain_fk+jacobian": "#009E73",
     "kinematics+dynamics": "#009E73",
     "chain+dynamics": "#009E73",
+    "chain_fk+jacobian+dynamics": "#009E73",
     "embedding": "#CC79A7",
     "none+end_effector": "#E69F00",
     "dynamics": "#E69F00",

@@ -6,7 +6,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from hcp_jax.envs.arm import HOLE, REACHER_GOALS, ArmTask
-from hcp_jax.envs.goal import GoalEnv
+from hcp_jax.envs.goal import MAX_SPEED, GoalEnv
 from hcp_jax.hardware.approach_poses import MAX_HEIGHT, add_approach_poses
 from hcp_jax.hardware.arm import arm_spec
 from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES, make_arm_pool, make_chain_pool
@@ -82,6 +82,14 @@ def test_noise_is_on_the_observation_alone(reacher, key):
     quiet = make_env(ArmTask("reacher", observation_noise=0.0))
     _, same, _ = play(quiet, key, jnp.zeros((4, 7)))
     np.testing.assert_array_equal(same.physics.qpos, after.physics.qpos)
+
+
+def test_a_joint_that_spins_off_is_observed_at_the_highest_speed(reacher, key):
+    state = reacher.reset(key, jnp.arange(reacher.num_robots))
+    spinning = state.replace(physics=state.physics.replace(qvel=jnp.full_like(state.physics.qvel, 1e7)))
+    after, _ = reacher.step(spinning, jnp.zeros((reacher.num_robots, 7)))
+    assert jnp.abs(after.physics.qvel).max() > 10 * MAX_SPEED
+    assert jnp.abs(after.obs[:, 7:]).max() <= MAX_SPEED + reacher.task.observation_noise
 
 
 def test_missing_joints_are_0_and_their_actions_cost_and_do_nothing(reacher, key):

@@ -51,13 +51,16 @@ def test_variants_of_an_arm_differ_in_masses_and_joint_dynamics_alone(panda_conf
 
 
 @pytest.mark.slow
-def test_the_table_has_each_arm_zero_shot_and_the_fine_tuned_one_beside_it(finished_arms, panda_run, tmp_path, capsys):
+def test_the_table_has_each_arm_under_each_policy_and_the_fine_tuned_one_beside_them(
+    finished_arms, panda_run, tmp_path, capsys
+):
     path = tmp_path / "catalogue.json"
     arguments = ["--robots", "ur5e", "panda", "--trials", "2", "--episodes-per-trial", "2", "--json", str(path)]
-    catalogue.main([str(finished_arms), "--fine-tuned", str(panda_run), *arguments])
+    catalogue.main([str(finished_arms), str(finished_arms), "--fine-tuned", str(panda_run), *arguments])
     panda, ur5e = json.loads(path.read_text())
     assert (panda["robot"], panda["joints"], ur5e["robot"], ur5e["joints"]) == ("panda", 7, "ur5e", 6)
-    assert (panda["zero_shot"]["control_steps"], panda["fine_tuned"]["control_steps"]) == (320, 40)
+    assert [part["control_steps"] for part in (*panda["zero_shot"], panda["fine_tuned"])] == [320, 320, 40]
+    assert panda["zero_shot"][0] == panda["zero_shot"][1]
     assert panda["fine_tuned"]["policy"] == str(panda_run)
     assert ur5e["fine_tuned"] is None
     assert 0.0 <= ur5e["reachable_share"] <= 100.0
@@ -66,11 +69,11 @@ def test_the_table_has_each_arm_zero_shot_and_the_fine_tuned_one_beside_it(finis
 
 def test_what_no_table_can_be_made_of_is_said(finished_arms, panda_run, tiny_config, tmp_path):
     with pytest.raises(ConfigError, match="--robots=pr2: expected arms out of fetch, gen3"):
-        make_catalogue_table(finished_arms, names=["pr2"])
+        make_catalogue_table([finished_arms], names=["pr2"])
     with pytest.raises(ConfigError, match="not trained on an arm of the catalogue"):
-        make_catalogue_table(finished_arms, fine_tuned=[finished_arms])
+        make_catalogue_table([finished_arms], fine_tuned=[finished_arms])
     with pytest.raises(ConfigError, match="is of panda too"):
-        make_catalogue_table(finished_arms, fine_tuned=[panda_run, panda_run])
+        make_catalogue_table([finished_arms], fine_tuned=[panda_run, panda_run])
     (tmp_path / "config.json").write_text(json.dumps(to_dict(tiny_config)))
     with pytest.raises(ConfigError, match="a policy of hoppers"):
-        make_catalogue_table(tmp_path)
+        make_catalogue_table([finished_arms, tmp_path])

@@ -15,9 +15,9 @@ def test_a_kind_and_a_row_are_a_choice_and_nothing_else_is(word, choice):
     assert choice is None or str(choice) == word
 
 
-def test_arms_that_hold_a_peg_are_of_peg_insertion_alone(tiny_config, tiny_arms):
+def test_arms_that_hold_a_peg_are_of_the_peg_alone_and_random_chains_of_the_reacher(tiny_config, tiny_arms):
     assert heldout_kinds(tiny_config) == ("hopper",)
-    assert heldout_kinds(tiny_arms) == tuple("ABCDEFGHI")
+    assert heldout_kinds(tiny_arms) == (*"ABCDEFGHI", "R4", "R5", "R6", "R7")
     assert heldout_kinds(dataclasses.replace(tiny_arms, task="peg_insertion")) == tuple("ABCDEFGHIJK")
 
 

@@ -75,6 +75,17 @@ def test_the_command_says_joints_assumptions_and_what_lies_outside(tmp_path, cap
     assert f"{len(outside)} of {len(record['entries'])} entries" in shown
 
 
+def test_the_arms_to_compare_with_are_those_of_a_policy(finished_arms, finished_run, tmp_path, capsys):
+    arguments = ["check", str(TEMPLATE), "--tip", "l6", "--json", str(tmp_path / "out.json")]
+    robot.main([*arguments, "--policy", str(finished_arms)])
+    nearest = json.loads((tmp_path / "out.json").read_text())["nearest"]
+    assert nearest["type"] in ("A", "I")
+    assert nearest["robot_id"] % 10_000 < 2  # it was trained on two of each
+    with pytest.raises(SystemExit):
+        robot.main([*arguments, "--policy", str(finished_run)])
+    assert "expected one that was trained on types of arms" in capsys.readouterr().err
+
+
 def test_a_policy_is_evaluated_on_ones_own_arm(finished_arms, tmp_path):
     arguments = ["--robot", str(TEMPLATE), "--tip", "l6", "--trials", "2", "--robots-per-trial", "3"]
     evaluate.main([str(finished_arms), *arguments, "--json", str(tmp_path / "out.json")])

@@ -15,6 +15,7 @@ LENGTHS = {
     "chain": 48,
     "chain_fk": 57,
     "chain_fk+jacobian": 109,
+    "chain_fk+jacobian+dynamics": 137,
     "chain+dynamics": 76,
     "dynamics": 28,
     "random": 28,
@@ -80,3 +81,25 @@ def test_chain_fk_holds_the_end_effector_its_offset_and_zeros_for_missing_joints
     np.testing.assert_allclose(values[:, 54:], features(arms, "none+goal_offset", angles), atol=1e-5)
     np.testing.assert_array_equal(values[0, [*range(15, 21), *range(36, 42)]], 0.0)
     assert (values[1, 15:21] != 0.0).all()
+
+
+def test_motor_loads_are_the_torques_that_mujoco_holds_the_arm_with_and_what_the_motors_make_of_the_rest(arms, angles):
+    limit = np.where(arms.hardware["joint_mask"] > 0, arms.hardware["torque_limit"], 1.0)
+    values = features(arms, "chain_fk+jacobian+dynamics", angles)
+    plain = features(arms, "chain_fk+jacobian", angles)
+    np.testing.assert_array_equal(values[:, :99], plain[:, :99])
+    np.testing.assert_array_equal(values[:, 127:], plain[:, 99:])
+    hold, damping, friction, agility = np.split(values[:, 99:127], 4, axis=1)
+    for row, model in enumerate(arms.models()):
+        data = mujoco.MjData(model)
+        data.qpos[:] = angles[row]
+        mujoco.mj_forward(model, data)
+        np.testing.assert_allclose(hold[row] * limit[row], data.qfrc_bias, atol=1e-3)
+        count, inertia = int(arms.hardware["joint_mask"][row].sum()), np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, inertia)
+        # Links as points: no more inertia than they have, and most of it.
+        ratio = limit[row, :count] / np.diag(inertia)[:count] / np.exp(agility[row, :count])
+        assert ((ratio > 0.3) & (ratio < 1.0 + 1e-4)).all()
+        np.testing.assert_array_equal(agility[row, count:], 0.0)
+    np.testing.assert_allclose(damping * limit, arms.hardware["damping"], rtol=1e-5)
+    np.testing.assert_allclose(friction * limit, arms.hardware["frictionloss"], rtol=1e-5)
