@@ -16,7 +16,7 @@ from hcp_jax.config import Config, DDPGConfig, HopperConfig, PPOConfig
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "hcp_jax"
-RESULTS = ("*.json", "*.png", "*/*.json", "*/*.png", "arms/evaluations/*.json")
+RESULTS = ("*.json", "*.png", "*/*.json", "*/*.png", "*/evaluations/*.json")
 _ENTRY = re.compile(r"    (\w+(?:, \w+)*): (.*)")  # of a docstring's Attributes
 _CONTINUED = re.compile(r"        +(.*)")
 _INTRODUCTION = """# Configuration

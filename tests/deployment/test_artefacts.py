@@ -195,7 +195,7 @@ def test_ones_own_arm_keeps_the_names_of_its_joints(loaded):
 
 
 BAD_ROBOTS = {
-    "K:0": "--robot=K:0: expected types out of A, B, C, D, E, F, G, H, I, train for reacher",
+    "K:0": "--robot=K:0: expected types out of A, B, C, D, E, F, G, H, I, R4, R5, R6, R7, train for reacher",
     "train:8": "--robot=train:8: expected a row from 0 to 7",
     "nowhere.urdf": "no such file",
 }

@@ -46,7 +46,7 @@ def test_the_newest_checkpoints_and_the_best_are_kept(finished_run, tiny_config)
     assert checkpoints.best() == best
 
 
-@pytest.mark.parametrize("cut", [2, 3, 5])
+@pytest.mark.parametrize("cut", [3, *(pytest.param(cut, marks=pytest.mark.slow) for cut in (2, 5))])
 def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished_run, tiny_config, tmp_path, cut):
     """Cut after `cut` of 8 iterations: between two evaluations and at one."""
     folder = tmp_path / "run"
