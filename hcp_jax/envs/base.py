@@ -110,18 +110,17 @@ class PoolEnv:
         state, transition = self.step_without_reset(state, action)
         key, key_robot, key_reset = jax.random.split(state.key, 3)
         fresh_index = jax.random.randint(key_robot, state.index.shape, 0, self.num_robots, jnp.int32)
-        fresh = self.reset(key_reset, fresh_index)
-        done = transition.done
-        return (
-            EnvState(
-                physics=select_rows(done, fresh.physics, state.physics),
-                index=jnp.where(done, fresh.index, state.index),
-                obs=jnp.where(done[:, None], fresh.obs, state.obs),
-                step_count=jnp.where(done, 0, state.step_count),
-                episode_return=jnp.where(done, 0.0, state.episode_return),
-                key=key,
-            ),
-            transition,
+        return self.restart(state, transition.done, key_reset, fresh_index).replace(key=key), transition
+
+    def restart(self, state: EnvState, done: jax.Array, key: jax.Array, index: jax.Array) -> EnvState:
+        """Worlds where `done` [B] is set start an episode of robots `index` [B]; the others go on."""
+        fresh = self.reset(key, index)
+        return state.replace(
+            physics=select_rows(done, fresh.physics, state.physics),
+            index=jnp.where(done, fresh.index, state.index),
+            obs=jnp.where(done[:, None], fresh.obs, state.obs),
+            step_count=jnp.where(done, 0, state.step_count),
+            episode_return=jnp.where(done, 0.0, state.episode_return),
         )
 
     def step_without_reset(self, state: EnvState, action: jax.Array) -> tuple[EnvState, Transition]:

@@ -17,7 +17,6 @@ from hcp_jax.config import ConfigError
 from hcp_jax.envs.base import PoolEnv
 from hcp_jax.experiment.hopper import HopperExperiment
 from hcp_jax.hardware.pool import RobotPool
-from hcp_jax.physics.base import select_rows
 from hcp_jax.policies.distribution import sample_gaussian
 
 # v_h has mean 0 and standard deviation 1 over the training robots. One control step's prediction weighs this much against that.
@@ -68,12 +67,7 @@ def act(ppo: PPO, env: PoolEnv, state: PPOState, num_steps: int, key: jax.Array)
         obs = ppo.normalize(env_state.obs, state.reserve.obs_statistics)
         action = sample_gaussian(*ppo.network.apply(network, obs, blind, method="act"), key_action)
         env_state, transition = env.step_without_reset(env_state, action)
-        fresh = env.reset(key_reset, index)
-        env_state = env_state.replace(
-            physics=select_rows(transition.done, fresh.physics, env_state.physics),
-            obs=jnp.where(transition.done[:, None], fresh.obs, env_state.obs),
-            step_count=jnp.where(transition.done, 0, env_state.step_count),
-        )
+        env_state = env.restart(env_state, transition.done, key_reset, index)
         return env_state, (forward_model_variables(transition.obs, transition.next_obs), transition.action)
 
     key, key_reset = jax.random.split(key)
