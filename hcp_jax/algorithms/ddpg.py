@@ -2,7 +2,7 @@
 
 train(state, n):                         one jitted call, buffers donated
   for each of n iterations:
-    collect                              one episode in each of num_envs worlds, in lockstep
+    play                                 one episode in each of num_envs worlds, in lockstep
     add_episodes                         whole, with the robot's index instead of its v_h
     for each of updates_per_iteration:   draw steps, relabel goals, reward them
                                          critic towards the n-step return and Q' unless it succeeds, actor up the critic
@@ -10,7 +10,6 @@ train(state, n):                         one jitted call, buffers donated
     the mean of the actors, which is evaluated, follows
 """
 
-import math
 from typing import Any, ClassVar, Protocol
 
 import jax
@@ -19,28 +18,25 @@ import optax
 from brax.training.acme import running_statistics, specs
 from flax import struct
 
+from hcp_jax.algorithms.exploration import ExploredEnv, Explorer
 from hcp_jax.algorithms.guard import Skipped, apply_update, init_skipped
 from hcp_jax.algorithms.her import relabel_goals
+from hcp_jax.algorithms.optimizers import make_ddpg_optimizer
 from hcp_jax.algorithms.replay import EpisodeBatch, Replay, StepSample, add_episodes, episode_shapes, init_replay, sample_steps
+from hcp_jax.algorithms.returns import sum_rewards
 from hcp_jax.config import DDPGConfig
 from hcp_jax.devices import put_everywhere, split_rows
-from hcp_jax.envs.goal import GoalState, GoalTransition
 from hcp_jax.policies.networks import Critic, DeterministicActor, JointActor, JointCritic
 
 Params = dict[str, Any]  # {"actor": ..., "critic": ... with a leading axis of critics, "embedding": [N, K] or None}
 
 
-class Env(Protocol):
+class Env(ExploredEnv, Protocol):
     """What DDPG needs of an environment (`hcp_jax.envs.goal.GoalEnv`)."""
 
     observation_size: int
-    action_size: int
     goal_size: int
-    num_robots: int
-    episode_length: int
 
-    def reset(self, key: jax.Array, index: jax.Array) -> GoalState: ...
-    def step(self, state: GoalState, action: jax.Array) -> tuple[GoalState, GoalTransition]: ...
     def compute_reward(
         self, achieved_goal: jax.Array, desired_goal: jax.Array, action: jax.Array
     ) -> tuple[jax.Array, jax.Array]: ...
@@ -83,7 +79,6 @@ class DDPGState:
 
 
 MIN_STD = 1e-6  # to which brax's running statistics are clipped from below
-FAILURE_STEP = 0.2  # of a robot's running mean of failures, per episode
 LOSS_METRICS = ("critic_loss", "actor_loss", "q")
 SUMS = (*LOSS_METRICS, "iterations", "updates", "episodes", "successes", "final_distance")
 
@@ -119,21 +114,9 @@ class DDPG:
         else:
             self.actor = DeterministicActor(config.hidden_sizes, env.action_size, config.layer_norm)
             self.critic = Critic(config.hidden_sizes, config.layer_norm)
-        weight_decay = optax.add_decayed_weights(config.critic_weight_decay, mask=mark_kernels)
         self._num_iterations = num_iterations
-        num_updates = num_iterations * config.updates_per_iteration
-
-        def adam(rate: float) -> optax.GradientTransformation:
-            return optax.adam(optax.linear_schedule(rate, rate * config.learning_rate_decay, num_updates))
-
-        self._optimizer = optax.multi_transform(
-            {
-                "actor": adam(config.actor_learning_rate),
-                "critic": optax.chain(weight_decay, adam(config.critic_learning_rate)),
-                "embedding": adam(embedding_learning_rate),
-            },
-            {"actor": "actor", "critic": "critic", "embedding": "embedding"},
-        )
+        self._optimizer = make_ddpg_optimizer(config, num_iterations, embedding_learning_rate)
+        self._explorer = Explorer(env, self._explored_action, config, num_envs)
         self.train = jax.jit(self._train, donate_argnums=0)
 
     def buffer_shapes(self) -> EpisodeBatch:
@@ -191,83 +174,29 @@ class DDPG:
         return put_everywhere(jax.lax.fori_loop(0, num_iterations, lambda _, s: self._train_iteration(s), state))
 
     def _train_iteration(self, state: DDPGState) -> DDPGState:
-        key, key_collect, key_update = jax.random.split(state.key, 3)
-        episodes, failed, diverged, overflow, sums = self._collect(state, key_collect)
-        change = FAILURE_STEP * (failed - state.failure[episodes.index])
-        statistics = running_statistics.update(state.statistics, self._step_inputs(state.params["embedding"], episodes))
+        key, key_play, key_update = jax.random.split(state.key, 3)
+        played = self._explorer.play((state.params, state.statistics), state.failure, self._is_warm(state), key_play)
+        inputs = self._step_inputs(state.params["embedding"], played.episodes)
         state = state.replace(
             iteration=state.iteration + 1,
             key=key,
-            statistics=statistics,
-            replay=add_episodes(state.replay, episodes),
-            failure=state.failure.at[episodes.index].add(change),
-            diverged=state.diverged.at[episodes.index].add(diverged.astype(jnp.int32)),
-            overflow=state.overflow + overflow,
-            sums=state.sums | {name: state.sums[name] + value for name, value in sums.items()},
+            statistics=running_statistics.update(state.statistics, inputs),
+            replay=add_episodes(state.replay, played.episodes),
+            failure=played.failure,
+            diverged=state.diverged.at[played.episodes.index].add(played.diverged.astype(jnp.int32)),
+            overflow=state.overflow + played.overflow,
+            sums=state.sums | {name: state.sums[name] + value for name, value in played.sums.items()},
         )
-        is_warm = state.replay.num_added >= self.config.warmup_episodes
-        return jax.lax.cond(is_warm, self._learn, lambda state, key: state, state, key_update)
+        return jax.lax.cond(self._is_warm(state), self._learn, lambda state, key: state, state, key_update)
 
-    def _collect(self, state: DDPGState, key: jax.Array) -> tuple[EpisodeBatch, jax.Array, jax.Array, jax.Array, dict]:
-        """Plays `num_envs` episodes with the exploring policy; also which failed and diverged [B], overflows [] and metrics."""
-        key_robots, key_reset, key_noise, key_steps = jax.random.split(key, 4)
-        first = split_rows(self.env.reset(key_reset, self._draw_robots(state, key_robots)))
-        correlation = self.config.exploration_correlation
+    def _is_warm(self, state: DDPGState) -> jax.Array:
+        """Whether the buffer holds enough to learn from: [] bool."""
+        return state.replay.num_added >= self.config.warmup_episodes
 
-        def step(carry: tuple[GoalState, jax.Array], key: jax.Array):
-            env_state, noise = carry
-            key_noise, key_action = jax.random.split(key)
-            fresh = jax.random.normal(key_noise, noise.shape)
-            noise = correlation * noise + math.sqrt(1.0 - correlation**2) * fresh
-            action = self._explore(state, env_state, noise, key_action)
-            next_state, transition = self.env.step(env_state, action)
-            return (split_rows(next_state), noise), (env_state.obs, env_state.achieved_goal, transition)
-
-        first_noise = jax.random.normal(key_noise, (self.num_envs, self.env.action_size))
-        keys = jax.random.split(key_steps, self.env.episode_length)
-        (last, _), (obs, achieved_goal, transitions) = jax.lax.scan(step, (first, first_noise), keys)
-        ended = jnp.cumsum(transitions.diverged, axis=0) > 0
-        is_over = ended
-        if self.config.stop_at_success:  # after the step that succeeds
-            is_over = ended | (jnp.cumsum(transitions.success, axis=0) - transitions.success > 0)
-        episodes = EpisodeBatch(
-            obs=jnp.swapaxes(jnp.concatenate([obs, last.obs[None]]), 0, 1),
-            achieved_goal=jnp.swapaxes(jnp.concatenate([achieved_goal, last.achieved_goal[None]]), 0, 1),
-            action=jnp.swapaxes(transitions.action, 0, 1),
-            desired_goal=first.desired_goal,
-            index=first.index,
-            length=jnp.sum(~is_over, axis=0, dtype=jnp.int32),
-        )
-        succeeded = jnp.any(transitions.success, axis=0).astype(jnp.float32)
-        sums = {
-            "iterations": 1.0,
-            "episodes": float(self.num_envs),
-            "successes": jnp.sum(succeeded),
-            "final_distance": jnp.sum(transitions.distance[-1]),
-        }
-        return episodes, 1.0 - succeeded, ended[-1], jnp.sum(transitions.overflow), sums
-
-    def _draw_robots(self, state: DDPGState, key: jax.Array) -> jax.Array:
-        """The iteration's robots: evenly, but for the share of those that fail. [B] int32."""
-        even = draw_robots(key, self.env.num_robots, self.num_envs)
-        if not self.config.failing_share:
-            return even
-        key_failing, key_choice = jax.random.split(jax.random.fold_in(key, 1))
-        failing = jax.random.categorical(key_failing, jnp.log(state.failure + 1e-3), shape=even.shape).astype(jnp.int32)
-        return jnp.where(jax.random.uniform(key_choice, even.shape) < self.config.failing_share, failing, even)
-
-    def _explore(self, state: DDPGState, env_state: GoalState, noise: jax.Array, key: jax.Array) -> jax.Array:
-        """The policy's action with standard Gaussian `noise` scaled, or a uniform one: always while the buffer warms up."""
-        key_uniform, key_choice = jax.random.split(key)
-        mean = self.mean_action(
-            state.params, state.statistics, self.conditioning, env_state.index, env_state.obs, env_state.desired_goal
-        )
-        noisy = mean + self.config.exploration_noise * noise
-        uniform = jax.random.uniform(key_uniform, mean.shape, minval=-1.0, maxval=1.0)
-        is_warm = state.replay.num_added >= self.config.warmup_episodes
-        share = jnp.where(is_warm, self.config.random_action_probability, 1.0)
-        is_random = jax.random.uniform(key_choice, (mean.shape[0], 1)) < share
-        return jnp.clip(jnp.where(is_random, uniform, noisy), -1.0, 1.0)
+    def _explored_action(self, learned: tuple, index: jax.Array, obs: jax.Array, goal: jax.Array) -> jax.Array:
+        """The actor's, not its mean's, before noise: [B, A]."""
+        params, statistics = learned
+        return self.mean_action(params, statistics, self.conditioning, index, obs, goal)
 
     def _step_inputs(self, embedding: jax.Array | None, episodes: EpisodeBatch) -> jax.Array:
         """The networks' inputs at every step of new episodes: [B, T, size]."""
@@ -343,34 +272,3 @@ class DDPG:
         """Action values of each critic: [C, B]."""
         apply: Any = self.critic.apply
         return jax.vmap(apply, in_axes=(0, None, None))(critic, inputs, action)
-
-
-def sum_rewards(reward: jax.Array, success: jax.Array, num_steps: jax.Array, gamma: float) -> tuple[jax.Array, jax.Array]:
-    """The discounted rewards of runs of K steps until the first success, and what the value after them counts for.
-
-    Args:
-        reward, success: [N, K] of each step.
-        num_steps: [N] of the K steps that count.
-        gamma: discount per step.
-
-    Returns:
-        returns [N] and discounts [N] of the value of the state after `num_steps` steps, 0 after a success.
-    """
-    step = jnp.arange(reward.shape[1])
-    success = success & (step < num_steps[:, None])
-    is_before_success = jnp.cumsum(success, axis=1) - success == 0
-    counts = is_before_success & (step < num_steps[:, None])
-    discount = jnp.where(jnp.any(success, axis=1), 0.0, gamma ** num_steps.astype(reward.dtype))
-    return jnp.sum(jnp.where(counts, gamma**step * reward, 0.0), axis=1), discount
-
-
-def draw_robots(key: jax.Array, num_robots: int, num_envs: int) -> jax.Array:
-    """Robots for `num_envs` episodes, none twice before each was drawn once: [B] int32."""
-    keys = jax.random.split(key, -(-num_envs // num_robots))
-    rows = jax.vmap(lambda key: jax.random.permutation(key, num_robots))(keys)
-    return rows.reshape(-1)[:num_envs].astype(jnp.int32)
-
-
-def mark_kernels(params: Any) -> Any:
-    """True at the kernels of dense layers."""
-    return jax.tree_util.tree_map_with_path(lambda path, _: getattr(path[-1], "key", None) == "kernel", params)

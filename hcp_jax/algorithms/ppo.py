@@ -18,7 +18,6 @@ from typing import Any, ClassVar, Protocol
 
 import jax
 import jax.numpy as jnp
-import optax
 from brax.training.acme import running_statistics, specs
 from flax import struct
 
@@ -28,6 +27,8 @@ from hcp_jax.algorithms.identification import (
     prediction_loss,
     standardize_embedding,
 )
+from hcp_jax.algorithms.losses import clipped_surrogate, clipped_value_loss
+from hcp_jax.algorithms.optimizers import make_ppo_optimizer
 from hcp_jax.algorithms.returns import compute_gae
 from hcp_jax.config import EmbeddingConfig, PPOConfig
 from hcp_jax.devices import put_everywhere, split_rows
@@ -143,37 +144,10 @@ class PPO:
         self.network = ActorCritic(
             env.action_size, env.observation_size, config.hidden_sizes, config.initial_log_std, self.identify_iterations > 0
         )
-        self._optimizer = self._make_optimizer(num_iterations)
-        self.train = jax.jit(self._train, donate_argnums=0)
-
-    def _make_optimizer(self, num_iterations: int) -> optax.GradientTransformation:
-        config = self.config
-        updates_per_iteration = config.num_epochs * config.num_minibatches
-        decay = config.final_learning_rate / config.learning_rate
-
-        def until_the_end(rate: float) -> optax.Schedule:
-            updates = (num_iterations - self.identify_iterations) * updates_per_iteration
-            return optax.linear_schedule(rate, rate * decay, max(1, updates))
-
-        def while_identifying(rate: float) -> optax.Schedule:
-            updates = self.identify_iterations * updates_per_iteration
-            # Exactly 0 in the end, which optax's linear schedule is not.
-            return lambda count: jnp.where(jnp.asarray(count) < updates, rate * (1.0 - count / updates), 0.0)
-
-        schedule = while_identifying if self.identify_iterations else until_the_end
-        clip = optax.clip_by_global_norm(config.max_grad_norm)
-        network = optax.chain(clip, optax.adam(until_the_end(config.learning_rate), eps=1e-5))
-        model = optax.chain(clip, optax.adam(schedule(self.embedding.model_learning_rate), eps=1e-5))
-        # A row's gradient is its robot's share of a minibatch, so it is tiny: no clipping, a small eps.
-        embedding = optax.adam(schedule(self.embedding.learning_rate), eps=1e-8)
-        return optax.multi_transform(
-            {
-                "network": network if self._train_network else optax.set_to_zero(),
-                "forward_model": model if self._train_forward_model else optax.set_to_zero(),
-                "embedding": embedding,
-            },
-            label_params,
+        self._optimizer = make_ppo_optimizer(
+            config, embedding, num_iterations, self.identify_iterations, train_network, train_forward_model
         )
+        self.train = jax.jit(self._train, donate_argnums=0)
 
     def init_params(self, key: jax.Array) -> Params:
         key_network, key_embedding = jax.random.split(key)
@@ -392,29 +366,3 @@ def get_actor(params: Params, obs_statistics: running_statistics.RunningStatisti
 def put_actor(actor: Actor, network: dict) -> dict:
     """`network` with that actor's policy and value function."""
     return {"params": network["params"] | actor.network}
-
-
-def label_params(params: Params) -> Any:
-    """Names the optimiser of each parameter: `network`, `forward_model` or `embedding`."""
-
-    def label(path, _) -> str:
-        names = {getattr(key, "key", None) for key in path}
-        return next((name for name in ("embedding", "forward_model") if name in names), "network")
-
-    return jax.tree_util.tree_map_with_path(label, params)
-
-
-def clipped_surrogate(log_ratio: jax.Array, advantage: jax.Array, clip_eps: float) -> jax.Array:
-    """Negative clipped surrogate objective (Schulman et al. 2017, eq. 7), averaged: []."""
-    ratio = jnp.exp(log_ratio)
-    clipped = jnp.clip(ratio, 1.0 - clip_eps, 1.0 + clip_eps)
-    return -jnp.mean(jnp.minimum(ratio * advantage, clipped * advantage))
-
-
-def clipped_value_loss(value: jax.Array, old_value: jax.Array, target: jax.Array, clip_eps: float) -> jax.Array:
-    """Half the mean squared error, the larger of plain and clipped; `clip_eps` 0 does not clip: []."""
-    loss = jnp.square(value - target)
-    if clip_eps > 0:
-        clipped = old_value + jnp.clip(value - old_value, -clip_eps, clip_eps)
-        loss = jnp.maximum(loss, jnp.square(clipped - target))
-    return 0.5 * jnp.mean(loss)

@@ -1,4 +1,4 @@
-"""Returns and advantages of trajectories that end by termination, by truncation, or not at all."""
+"""Returns and advantages of trajectories that end by termination, by success, by truncation, or not at all."""
 
 import chex
 import jax
@@ -34,3 +34,22 @@ def compute_gae(
 
     _, advantages = jax.lax.scan(backward, jnp.zeros_like(delta[0]), (delta, trace), reverse=True)
     return advantages, advantages + value
+
+
+def sum_rewards(reward: jax.Array, success: jax.Array, num_steps: jax.Array, gamma: float) -> tuple[jax.Array, jax.Array]:
+    """The discounted rewards of runs of K steps until the first success, and what the value after them counts for.
+
+    Args:
+        reward, success: [N, K] of each step.
+        num_steps: [N] of the K steps that count.
+        gamma: discount per step.
+
+    Returns:
+        returns [N] and discounts [N] of the value of the state after `num_steps` steps, 0 after a success.
+    """
+    step = jnp.arange(reward.shape[1])
+    success = success & (step < num_steps[:, None])
+    is_before_success = jnp.cumsum(success, axis=1) - success == 0
+    counts = is_before_success & (step < num_steps[:, None])
+    discount = jnp.where(jnp.any(success, axis=1), 0.0, gamma ** num_steps.astype(reward.dtype))
+    return jnp.sum(jnp.where(counts, gamma**step * reward, 0.0), axis=1), discount

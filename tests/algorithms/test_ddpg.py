@@ -7,7 +7,7 @@ import pytest
 from brax.training.acme import running_statistics
 from goal_probes import PlaneEnv, PlaneInputs
 
-from hcp_jax.algorithms.ddpg import DDPG, DDPGState, draw_robots, mark_kernels, sum_rewards
+from hcp_jax.algorithms.ddpg import DDPG, DDPGState
 from hcp_jax.algorithms.replay import sample_steps
 from hcp_jax.config import ConfigError, DDPGConfig
 
@@ -99,16 +99,6 @@ def test_the_value_of_a_success_is_its_reward_and_a_failure_is_discounted_for_ev
     assert float(values[32:].mean()) < -7.0, "-1 in every step, gamma 0.9: -10 and the actions' cost"
 
 
-@pytest.mark.parametrize(
-    ("successes", "num_steps", "expected"),
-    [((), 3, (-1.75, 0.125)), ((), 2, (-1.5, 0.25)), ((1,), 3, (-0.5, 0.0)), ((2,), 2, (-1.5, 0.25)), ((0, 1), 3, (1.0, 0.0))],
-)
-def test_rewards_are_summed_to_the_first_success_or_the_last_step_that_counts(successes, num_steps, expected):
-    success = jnp.isin(jnp.arange(3), jnp.asarray(successes, jnp.int32))[None]
-    result = sum_rewards(jnp.where(success, 1.0, -1.0), success, jnp.array([num_steps]), gamma=0.5)
-    np.testing.assert_allclose(jnp.concatenate(result), expected)
-
-
 def test_the_same_seed_gives_the_same_result_in_one_call_or_two():
     learner = make()
     once, twice = trained(learner, 4), learner.train(trained(learner, 2), 2)
@@ -142,13 +132,6 @@ def test_an_episode_may_end_with_the_step_that_reaches_its_goal():
     steps = jnp.where(jnp.any(success, axis=1), jnp.argmax(success, axis=1) + 1, learner.env.episode_length)
     np.testing.assert_array_equal(episodes.length, steps)
     assert 20 < int(jnp.sum(steps < learner.env.episode_length)) < 180
-
-
-def test_robots_that_fail_are_drawn_more_often_as_far_as_asked():
-    learner = make((0.0,) * 20, failing_share=0.5)
-    state = trained(learner, 1).replace(failure=jnp.where(jnp.arange(20) == 3, 1.0, 0.0))
-    drawn = jnp.stack([learner._draw_robots(state, key) for key in jax.random.split(jax.random.key(1), 100)])
-    assert 0.4 < float((drawn == 3).mean()) < 0.6
 
 
 def test_a_robots_failures_are_averaged_over_its_episodes():
@@ -195,28 +178,6 @@ def test_an_input_that_never_varied_in_training_is_not_seen_by_the_networks():
     seen, of_another_robot = (learner.normalize(x, statistics) for x in (inputs, inputs.at[:, 0].set(0.4)))
     np.testing.assert_array_equal(seen, of_another_robot)
     np.testing.assert_allclose(seen[:, 1:].std(axis=0), 1.0, atol=0.1)
-
-
-def test_exploration_noise_is_correlated_from_step_to_step_as_asked():
-    for correlation in (0.0, 0.8):
-        learner = make(exploration_correlation=correlation, random_action_probability=0.0, exploration_noise=0.1)
-        start = learner.init(jax.random.key(0))
-        warm = start.replace(replay=start.replay.replace(num_added=jnp.int32(CONFIG.warmup_episodes)))
-        actions = np.concatenate([learner._collect(warm, key)[0].action for key in jax.random.split(jax.random.key(1), 40)])
-        assert abs(actions.std() - 0.1) < 0.01, "an untrained actor does almost nothing"
-        assert abs(np.corrcoef(actions[:, :-1].ravel(), actions[:, 1:].ravel())[0, 1] - correlation) < 0.05
-
-
-def test_robots_are_drawn_without_favour(key):
-    drawn = draw_robots(key, 4, 10)
-    np.testing.assert_array_equal(np.sort(drawn[:4]), np.arange(4))
-    np.testing.assert_array_equal(np.sort(drawn[4:8]), np.arange(4))
-
-
-def test_weight_decay_is_on_kernels_alone():
-    params = make().init(jax.random.key(0)).params
-    marked = mark_kernels(params["actor"])["params"]["hidden_0"]
-    assert marked == {"kernel": True, "bias": False}
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from probe_envs import ProbeEnv
 
 from hcp_jax.algorithms.identification import standardize_embedding
-from hcp_jax.algorithms.ppo import PPO, clipped_surrogate, clipped_value_loss, label_params
+from hcp_jax.algorithms.ppo import PPO
 from hcp_jax.config import EmbeddingConfig, PPOConfig
 from hcp_jax.policies.conditioning import Embedding
 
@@ -196,25 +196,3 @@ def test_the_learner_compiles_once_whatever_the_number_of_iterations():
     for count in (2, 3):
         state = ppo.train(state, count)
     assert ppo.train._cache_size() == compiled
-
-
-def test_the_surrogate_stops_rewarding_ratios_outside_the_clip_range():
-    advantage = jnp.asarray([1.0, 1.0, -1.0, -1.0])
-    ratio = jnp.asarray([1.1, 1.5, 0.9, 0.5])
-    expected = -np.mean([1.1, 1.2, -0.9, -0.8])
-    np.testing.assert_allclose(clipped_surrogate(jnp.log(ratio), advantage, 0.2), expected, rtol=1e-6)
-
-
-def test_a_clipped_value_is_charged_the_larger_error():
-    value, old, target = jnp.asarray([1.0]), jnp.asarray([0.0]), jnp.asarray([1.0])
-    np.testing.assert_allclose(clipped_value_loss(value, old, target, 0.2), 0.5 * 0.8**2, rtol=1e-5)
-    np.testing.assert_allclose(clipped_value_loss(value, old, target, 0.0), 0.0, atol=1e-7)
-
-
-def test_every_parameter_has_one_optimiser():
-    ppo = PPO(ProbeEnv(1, opposite_actions), Embedding(2, 2, 0.05), CONFIG, IDENTIFIED, NUM_ENVS, 4)
-    labels = label_params(ppo.init_params(jax.random.key(0)))
-    parts = labels["network"]["params"]
-    assert labels["embedding"] == "embedding"
-    assert set(jax.tree.leaves(parts["forward_model"])) == {"forward_model"}
-    assert set(jax.tree.leaves([parts["policy"], parts["value_function"], parts["log_std"]])) == {"network"}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from brax.training.agents.ppo.losses import compute_gae as brax_gae
 
-from hcp_jax.algorithms.returns import compute_gae
+from hcp_jax.algorithms.returns import compute_gae, sum_rewards
 
 
 def column(*values):
@@ -56,3 +56,13 @@ def test_it_equals_braxs_where_braxs_is_defined(seed):
     targets, _ = brax_gae(no * 1.0, terminated * 1.0, reward, value, jnp.ones(4), lambda_=0.9, discount=0.97)
     np.testing.assert_allclose(targets[-1], (ours + value)[-1], rtol=1e-4, atol=1e-5)
     np.testing.assert_allclose(targets, ours + value, rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("successes", "num_steps", "expected"),
+    [((), 3, (-1.75, 0.125)), ((), 2, (-1.5, 0.25)), ((1,), 3, (-0.5, 0.0)), ((2,), 2, (-1.5, 0.25)), ((0, 1), 3, (1.0, 0.0))],
+)
+def test_rewards_are_summed_to_the_first_success_or_the_last_step_that_counts(successes, num_steps, expected):
+    success = jnp.isin(jnp.arange(3), jnp.asarray(successes, jnp.int32))[None]
+    result = sum_rewards(jnp.where(success, 1.0, -1.0), success, jnp.array([num_steps]), gamma=0.5)
+    np.testing.assert_allclose(jnp.concatenate(result), expected)
