@@ -1,8 +1,0 @@
-"""Exp. VII of the paper: peg insertion, fixed hole, type E left out; HCP-E as released. Preset: fast."""
-
-from hcp_jax import presets
-from hcp_jax.config import Config
-
-
-def get_config() -> Config:
-    return presets.arm("peg_hcpe_leave_e", "peg_insertion", "chain_fk", left_out="E")

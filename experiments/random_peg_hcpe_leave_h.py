@@ -1,8 +1,0 @@
-"""Exp. XI of the paper: peg insertion, random hole, type H left out; HCP-E as released. Preset: fast."""
-
-from hcp_jax import presets
-from hcp_jax.config import Config
-
-
-def get_config() -> Config:
-    return presets.arm("random_peg_hcpe_leave_h", "peg_insertion", "chain_fk", left_out="H", random_hole=presets.RANDOM_HOLE)
