@@ -64,7 +64,7 @@ def make_leave_one_out(published: Published, setting: Setting) -> Item:
     names = dict.fromkeys(run.config.name for run in published.arms if setting.trains(run.config.name))
     groups = published.runs_of(list(names))
     panels = ((SUCCESS, "New arms of the types trained on."), (LEFT_OUT, f"Type {setting.left_out}, zero-shot."))
-    trained = [setting.experiment_name(algorithm) for algorithm in ("hcpe", "ddpg")]
+    trained = setting.experiment_names
     return Item(
         setting.title,
         describe_missing(published, trained),

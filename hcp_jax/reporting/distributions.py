@@ -57,7 +57,7 @@ def make_distances(published: Published, task: str) -> Item:
     figures = ()
     if spreads:
         figures = (Figure(draw_spreads(spreads, DISTANCE, SUCCESS_DISTANCE), describe_kinds(spreads), tuple(files)),)
-    names = [s.experiment_name(algorithm) for s in SETTINGS if s.task == task for algorithm in ("hcpe", "ddpg")]
+    names = [name for setting in SETTINGS if setting.task == task for name in setting.experiment_names]
     missing = [name for name in names if name not in shown]
     text = f"Not evaluated: {', '.join(missing)}." if missing and figures else ""
     commands = (*RESULTS_COMMANDS, EVALUATE_COMMAND.format(name="POLICY"))

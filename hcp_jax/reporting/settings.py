@@ -38,9 +38,11 @@ class Setting:
     def title(self) -> str:
         return f"Exp. {roman(self.experiment)} and {roman(self.experiment + 1)}: {self.task}, type {self.left_out} left out"
 
-    def experiment_name(self, algorithm: str) -> str:
-        """The file in `experiments/` that trains `hcpe` or `ddpg`."""
-        return f"{self.prefix}_{algorithm}_leave_{self.left_out.lower()}"
+    @property
+    def experiment_names(self) -> tuple[str, str]:
+        """The files in `experiments/` that train HCP-E, on the peg with Jacobians, and DDPG+HER."""
+        hcpe = "hcpe" if self.prefix == "reacher" else "jacobian"
+        return f"{self.prefix}_{hcpe}_leave_{self.left_out.lower()}", f"{self.prefix}_ddpg_leave_{self.left_out.lower()}"
 
     def trains(self, name: str) -> bool:
         """Whether an experiment of this name is of this setting."""

@@ -18,7 +18,7 @@ from hcp_jax.reporting.settings import (
 )
 
 COMMANDS = (*RESULTS_COMMANDS, EVALUATE_COMMAND.format(name="POLICY"), TABLES_COMMAND)
-ALGORITHMS = (("HCP-E", "hcpe"), ("DDPG+HER", "ddpg"))  # of the paper's pairs, with their files' names
+ALGORITHMS = ("HCP-E", "DDPG+HER")  # of the paper's pairs
 MEASUREMENTS = ("seeds", "std over seeds", "of reachable goals [%]", "control steps [M]", "minutes")
 NOT_RUN, NOT_EVALUATED = "not run", "not evaluated"
 
@@ -49,13 +49,12 @@ def make_table1(published: Published, rows: Sequence[TableRow]) -> Item:
     lines: dict[str, list[Row]] = {task: [] for task in TASKS}
     for setting in SETTINGS:
         trained = letters(name for name in PAPER_TYPES if name != setting.left_out)
-        for number, (algorithm, file) in enumerate(ALGORITHMS):
+        for number, (algorithm, name) in enumerate(zip(ALGORITHMS, setting.experiment_names, strict=True)):
             experiment = setting.experiment + number
             first = (roman(experiment), setting.left_out)
             measured = [row for row in rows if row.experiment == experiment]
             lines[setting.task] += [Row((*first, row.algorithm, name_inputs(row), *measurements(row))) for row in measured]
             if not measured:
-                name = setting.experiment_name(file)
                 steps = describe_progress(published, name)
                 state = NOT_EVALUATED if steps else NOT_RUN
                 cells = (algorithm, "", state, spread(*setting.paper[number]), "", trained, "", "", "", steps, "")
@@ -109,7 +108,7 @@ def make_types(published: Published, rows: Sequence[TableRow], task: str) -> Ite
     lines: list[Row] = []
     for setting in SETTINGS:
         if setting.task == task:
-            for number, (algorithm, _) in enumerate(ALGORITHMS):
+            for number, algorithm in enumerate(ALGORITHMS):
                 lines += types_of_experiment(rows, setting, setting.experiment + number, algorithm)
     columns = ("Exp.", "algorithm", "v_h", "", *PAPER_TYPES)
     table = Table("Success [%] by type", columns, "llll" + "r" * 9, tuple(lines), source(published, rows, "appendix.json"))
