@@ -89,7 +89,7 @@ class Explorer:
         succeeded = jnp.any(transitions.success, axis=0).astype(jnp.float32)
         return Exploration(
             episodes=episodes,
-            failure=failure.at[first.index].add(FAILURE_STEP * (1.0 - succeeded - failure[first.index])),
+            failure=update_failure(failure, first.index, 1.0 - succeeded),
             diverged=ended[-1],
             overflow=jnp.sum(transitions.overflow),
             sums={
@@ -117,6 +117,16 @@ class Explorer:
         share = jnp.where(is_warm, self.config.random_action_probability, 1.0)
         is_random = jax.random.uniform(key_choice, (mean.shape[0], 1)) < share
         return jnp.clip(jnp.where(is_random, uniform, noisy), -1.0, 1.0)
+
+
+def update_failure(failure: jax.Array, index: jax.Array, failed: jax.Array) -> jax.Array:
+    """Moves each robot's running mean [N] towards the outcomes [B], 1 for a failure, of the episodes of robots `index` [B].
+
+    A robot with more than 1 / `FAILURE_STEP` of them takes their mean: with a whole step for each it would overshoot.
+    """
+    count = jnp.zeros_like(failure).at[index].add(1.0)[index]
+    step = jnp.minimum(FAILURE_STEP, 1.0 / count)
+    return jnp.clip(failure.at[index].add(step * (failed - failure[index])), 0.0, 1.0)
 
 
 def draw_evenly(key: jax.Array, num_robots: int, num_envs: int) -> jax.Array:

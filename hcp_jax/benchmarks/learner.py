@@ -20,6 +20,7 @@ from hcp_jax.algorithms.replay import replay_bytes
 from hcp_jax.benchmarks.matmuls import Products, count_products, make_bare_products, total_flops
 from hcp_jax.benchmarks.physics import time_steps
 from hcp_jax.config import Config
+from hcp_jax.devices import replicate
 from hcp_jax.experiment.arm import ArmExperiment
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.experiment.hopper import HopperExperiment
@@ -83,7 +84,7 @@ def with_passes(run: Run, number: int) -> tuple[Callable, object]:
         changed = dataclasses.replace(config.ppo, num_epochs=number)
         embedding = dataclasses.replace(config.embedding, identify_steps=0)
         changed_learner = PPO(learner.env, learner.conditioning, changed, embedding, learner.num_envs, run.num_iterations)
-    return changed_learner.train, changed_learner.init(jax.random.key(config.seed))
+    return changed_learner.train, replicate(changed_learner.init(jax.random.key(config.seed)))
 
 
 def time_iteration(train: Callable, state, seconds: float) -> float:

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from goal_probes import PlaneEnv
 
-from hcp_jax.algorithms.exploration import Explorer, draw_evenly
+from hcp_jax.algorithms.exploration import Explorer, draw_evenly, update_failure
 from hcp_jax.config import DDPGConfig
 
 
@@ -30,6 +30,13 @@ def test_robots_that_fail_are_drawn_more_often_as_far_as_asked():
     failure = jnp.where(jnp.arange(20) == 3, 1.0, 0.0)
     drawn = jnp.stack([explorer.draw_robots(failure, key) for key in jax.random.split(jax.random.key(1), 100)])
     assert 0.4 < float((drawn == 3).mean()) < 0.6
+
+
+def test_a_robots_failures_move_towards_its_episodes_and_to_their_mean_if_they_are_many():
+    failure = update_failure(
+        jnp.asarray([1.0, 1.0, 0.5]), jnp.asarray([0, 0] + [1] * 20), jnp.asarray([0.0, 1.0] + [0.0, 1.0] * 10)
+    )
+    np.testing.assert_allclose(failure, [0.8, 0.5, 0.5], atol=1e-6)
 
 
 def test_noise_is_correlated_from_step_to_step_as_asked():
