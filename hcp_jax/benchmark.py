@@ -1,7 +1,6 @@
 """`python -m hcp_jax.benchmark physics|learner|train|scale [--config FILE] [--rows NAME ...] [--json FILE]`"""
 
 import argparse
-import pathlib
 from collections.abc import Iterable, Iterator
 
 import jax
@@ -18,6 +17,7 @@ from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.training.run_folder import describe_environment
 
 SUBJECTS = ("physics", "learner", "train", "scale")
+ROWS_OF = {"physics": ROWS, "train": TRAINING_ROWS}
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -32,11 +32,11 @@ def main(arguments: list[str] | None = None) -> None:
         "--batches", type=int, nargs="+", default=[1, 128, 1120, 8960], help="of physics: numbers of environments"
     )
     parser.add_argument("--sizes", type=int, nargs="+", default=[10, 100, 1000, 10000], help="of scale: numbers of robots")
-    parser.add_argument("--rows", nargs="+", choices=(*ROWS, *TRAINING_ROWS), help="of physics and train; default: all")
+    parser.add_argument("--rows", nargs="+", metavar="ROW", help="of physics and train; default: all")
     parser.add_argument("--to-success", type=float, help="of train: wall time until this share [%%] succeeds instead")
     parser.add_argument("--limit", type=float, default=3600.0, help="of --to-success: seconds after which a row is given up")
     parser.add_argument("--seconds", type=float, default=1.0, help="shortest time of one measurement")
-    parser.add_argument("--json", type=pathlib.Path, help="file to write the rows to")
+    parser.add_argument("--json", type=command_line.output_file, help="file to write the rows to")
     options, overrides = parser.parse_known_args(arguments)
     with command_line.user_errors_end_the_command():
         for name in ("batches", "sizes"):
@@ -46,20 +46,26 @@ def main(arguments: list[str] | None = None) -> None:
             config = command_line.load_config(options.config, overrides)
         else:
             config = command_line.apply_overrides(presets.arm("reacher", "reacher", "chain_fk", left_out="H"), overrides)
+        for row in options.rows or ():
+            if row not in ROWS_OF.get(options.subject, ()):
+                allowed = ", ".join(ROWS_OF.get(options.subject, ())) or "none"
+                raise ConfigError(f"--rows={row}: expected of {options.subject}: {allowed}")
+        if options.subject == "scale" and config.robot:
+            raise ConfigError(f"robot={config.robot!r}: expected types of arms, or hoppers, for scale")
         if options.to_success is not None and config.task == "hopper":
             raise ConfigError("--to-success: the hopper has no success: expected a reacher or peg_insertion")
         command_line.enable_compilation_cache()
         rows = []
         for row in measure(options, config):
             rows.append(row)
-            numbers = (f"{name} {value:,}" for name, value in row.items() if isinstance(value, (int, float)))
+            numbers = (f"{name} {format_number(value)}" for name, value in row.items() if isinstance(value, (int, float)))
             print(row["name"], *numbers, sep="  ", flush=True)
         if options.subject == "physics":
             print_speeds(config.name, rows)
         else:
             print_rows(config.name, rows)
-    if options.json:
-        write_json(options.json, {"environment": describe_environment(config.physics), "rows": rows})
+        if options.json:
+            write_json(options.json, {"environment": describe_environment(config.physics), "rows": rows})
 
 
 def measure(options: argparse.Namespace, config: Config) -> Iterable[dict]:
@@ -82,6 +88,11 @@ def times_to_success(options: argparse.Namespace, config: Config, rows: list[str
             yield time_to_success(config, name, options.to_success, options.limit)
 
 
+def format_number(value: object) -> str:
+    """With separators of thousands; what is no number as it is."""
+    return f"{value:,}" if isinstance(value, (int, float)) and not isinstance(value, bool) else str(value)
+
+
 def print_rows(title: str, rows: list[dict]) -> None:
     """A table with a column for everything that any row has."""
     table = Table(title=f"{title}, {jax.default_backend()}")
@@ -90,7 +101,7 @@ def print_rows(title: str, rows: list[dict]) -> None:
         table.add_column(column.replace("_", " "), justify="left" if column == "name" else "right")
     for row in rows:
         cells = (row.get(column, "") for column in columns)
-        table.add_row(*(f"{cell:,}" if isinstance(cell, (int, float)) else str(cell) for cell in cells))
+        table.add_row(*(format_number(cell) for cell in cells))
     Console().print(table)
 
 

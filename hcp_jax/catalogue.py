@@ -12,7 +12,6 @@ from hcp_jax.config import ConfigError
 from hcp_jax.evaluation.catalogue_table import make_catalogue_table
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.hardware.catalogue import catalogue_names
-from hcp_jax.physics.base import INTEGRATORS, PHYSICS
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -26,8 +25,8 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--robots", nargs="*", default=[], help=f"some of {', '.join(catalogue_names())}; all if left out")
     parser.add_argument("--trials", type=int, default=10)
     parser.add_argument("--episodes-per-trial", type=int, default=100)
-    parser.add_argument("--physics", default="auto", choices=[*PHYSICS, *(f"native-{name}" for name in INTEGRATORS)])
-    parser.add_argument("--json", type=pathlib.Path, help="file to write the table to")
+    command_line.add_physics_option(parser)
+    parser.add_argument("--json", type=command_line.output_file, help="file to write the table to")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
         for name in ("trials", "episodes_per_trial"):
@@ -37,9 +36,9 @@ def main(arguments: list[str] | None = None) -> None:
         settings = {"trials": options.trials, "episodes_per_trial": options.episodes_per_trial}
         settings |= {"names": options.robots, "physics": options.physics}
         rows = make_catalogue_table(options.policies, options.fine_tuned, **settings)
-    print_table(rows)
-    if options.json:
-        write_json(options.json, rows)
+        print_table(rows)
+        if options.json:
+            write_json(options.json, rows)
 
 
 def print_table(rows: list[dict]) -> None:

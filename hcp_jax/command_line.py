@@ -7,6 +7,7 @@ import pathlib
 import re
 import runpy
 import sys
+import tempfile
 from collections.abc import Iterator, Sequence
 
 import jax
@@ -14,11 +15,12 @@ from absl import flags
 from ml_collections import ConfigDict, config_flags
 
 from hcp_jax.config import Config, ConfigError, field_names, from_dict, to_dict, unknown_field
-from hcp_jax.errors import UserError, one_line
-from hcp_jax.physics.base import PhysicsOverflowError
-from hcp_jax.training.loop import NonFiniteError
+from hcp_jax.errors import NonFiniteError, PhysicsOverflowError, UserError, one_line
+from hcp_jax.hardware.catalogue import catalogue_names
+from hcp_jax.physics.base import INTEGRATORS, PHYSICS
 
 BAD_INPUT, BROKEN = 2, 1
+OWN_ARM = f"your arm, a URDF or MJCF file (see hcp_jax.robot check), or one of {', '.join(catalogue_names())}"
 _OVERRIDE = re.compile(r"--config\.([^=\s]+)(=.*)?$", re.DOTALL)
 
 
@@ -44,8 +46,32 @@ def user_errors_end_the_command() -> Iterator[None]:
         print(one_line(error), file=sys.stderr)
         sys.exit(BROKEN)
     except OSError as error:
-        print(f"{one_line(error)} (checkpoints that were finished before are kept)", file=sys.stderr)
+        print(one_line(error), file=sys.stderr)
         sys.exit(BROKEN)
+
+
+def output_file(word: str) -> pathlib.Path:
+    """A path on the command line that a file will be written to; one where none can be ends the command before its work."""
+    path = pathlib.Path(word)
+    try:
+        if path.exists():
+            path.open("a").close()
+        else:
+            tempfile.TemporaryFile(dir=next(parent for parent in path.absolute().parents if parent.exists())).close()
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f"{word}: cannot be written ({error.strerror})") from error
+    return path
+
+
+def add_chain_options(parser: argparse.ArgumentParser) -> None:
+    """Which part of an arm's file is the arm."""
+    parser.add_argument("--base", help="link that stands still at the origin; default: the file's root, where it stands")
+    parser.add_argument("--tip", help="last link, whose origin is the point of interest; default: the end of the only chain")
+
+
+def add_physics_option(parser: argparse.ArgumentParser) -> None:
+    choices = [*PHYSICS, *(f"native-{name}" for name in INTEGRATORS)]
+    parser.add_argument("--physics", default="auto", choices=choices, help="engine; native-rk4: with that integrator")
 
 
 def enable_compilation_cache() -> None:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.experimental import multihost_utils
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
@@ -45,6 +46,11 @@ def join_processes() -> None:
         ) from error
 
 
+def count_cores() -> int:
+    """Processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def is_main() -> bool:
     """Whether this is process 0."""
     return jax.process_index() == 0
@@ -56,12 +62,12 @@ def any_process(flag: bool) -> bool:
 
 
 def do_in_main(action: Callable[[], None]) -> None:
-    """Runs `action` in process 0 alone, while the others wait. Where it raises a UserError, they raise a JoinError."""
+    """Runs `action` in process 0 alone, while the others wait. Where it raises an exception, they raise a JoinError."""
     error = None
     if is_main():
         try:
             action()
-        except UserError as raised:
+        except Exception as raised:  # whatever it is, the others must not wait for ever
             error = raised
     if any_process(error is not None):
         raise error or JoinError("process 0 could not go on, and says why")
@@ -114,3 +120,8 @@ def gather(tree: Any) -> Any:
     if jax.process_count() == 1:
         return tree
     return jax.tree.map(lambda leaf: leaf.addressable_data(0), jax.jit(put_everywhere)(tree))
+
+
+def copy_tree(tree: Any) -> Any:
+    """Fresh buffers, so that donating them leaves the original alone."""
+    return jax.tree.map(jnp.copy, tree)

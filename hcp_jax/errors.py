@@ -1,8 +1,22 @@
-"""What bad input raises, and how errors are said."""
+"""What bad input and broken runs raise, and how errors are said."""
 
 
 class UserError(ValueError):
     """What the user gave cannot be used. Its message is one line that names it; commands print that and exit with code 2."""
+
+
+class PhysicsOverflowError(RuntimeError):
+    """Contacts or constraints were dropped because a buffer was too small."""
+
+    def __init__(self, num_steps: int):
+        super().__init__(
+            f"{num_steps} physics steps overflowed a contact or constraint buffer, so their results are wrong: "
+            "raise max_contacts or max_constraints of MjxPhysics (hcp_jax/physics/mjx.py) or the template's <size memory>"
+        )
+
+
+class NonFiniteError(RuntimeError):
+    """Losses or gradients were not finite in too many updates in a row."""
 
 
 def one_line(error: BaseException) -> str:

@@ -12,8 +12,6 @@ from hcp_jax.evaluation.hopper_sweeps import evaluate_hoppers
 from hcp_jax.evaluation.new_robots import RangeChange, check_types
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.hardware.catalogue import load_robot
-from hcp_jax.physics.base import INTEGRATORS, PHYSICS
-from hcp_jax.robot import OWN_ARM, add_chain_options
 from hcp_jax.training.run_folder import read_config
 
 
@@ -22,7 +20,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("run", type=pathlib.Path, help="run folder")
     parser.add_argument("--trials", type=int, default=10)
     parser.add_argument("--robots-per-trial", type=int, default=100)
-    parser.add_argument("--physics", default="auto", choices=[*PHYSICS, *(f"native-{name}" for name in INTEGRATORS)])
+    command_line.add_physics_option(parser)
     parser.add_argument("--fit-steps", type=int, help="control steps of each new robot for fitting its v_h (HCP-I); 0 skips it")
     parser.add_argument(
         "--first-steps",
@@ -42,11 +40,11 @@ def main(arguments: list[str] | None = None) -> None:
         help="draw the new robots' hardware from another range than in training: --range damping 30 40",
     )
     parser.add_argument("--pool", type=pathlib.Path, help="take the new robots from a folder that RobotPool.save wrote")
-    parser.add_argument("--robot", help=OWN_ARM)
-    add_chain_options(parser)
+    parser.add_argument("--robot", help=command_line.OWN_ARM)
+    command_line.add_chain_options(parser)
     parser.add_argument("--seed", type=int, default=0, help="seed of the initial states")
     parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
-    parser.add_argument("--json", type=pathlib.Path, help="file to write the whole record to")
+    parser.add_argument("--json", type=command_line.output_file, help="file to write the whole record to")
     parser.add_argument("--without-robots", action="store_true", help="leave the rows of single robots out of that file")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
@@ -72,11 +70,10 @@ def main(arguments: list[str] | None = None) -> None:
                 robot = load_robot(options.robot, options.base, options.tip)
                 settings["own_robots"] = {pathlib.Path(options.robot).stem: robot}
             record = evaluate_arms(options.run, types=options.types or (), **settings)
-    print_table(record)
-    if options.json:
-        write_json(
-            options.json, {name: value for name, value in record.items() if name != "robots" or not options.without_robots}
-        )
+        print_table(record)
+        if options.json:
+            left_out = ("robots",) if options.without_robots else ()
+            write_json(options.json, {name: value for name, value in record.items() if name not in left_out})
 
 
 def read_range(name: str, low: str, high: str) -> RangeChange:

@@ -4,7 +4,6 @@ import pathlib
 
 from hcp_jax import command_line
 from hcp_jax.deployment.artefacts import DESCRIPTION_FILE, JAX_FILE, MODEL_FILE, ONNX_FILE, export_policy
-from hcp_jax.robot import OWN_ARM, add_chain_options
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -13,9 +12,11 @@ def main(arguments: list[str] | None = None) -> None:
     )
     parser.add_argument("run", type=pathlib.Path, help="run folder")
     parser.add_argument(
-        "--robot", required=True, help=f"H:3 (held-out robot 3 of a type), train:3 (training robot 3); or {OWN_ARM}"
+        "--robot",
+        required=True,
+        help=f"H:3 (held-out robot 3 of a type), train:3 (one trained on); or {command_line.OWN_ARM}",
     )
-    add_chain_options(parser)
+    command_line.add_chain_options(parser)
     parser.add_argument("--out", type=pathlib.Path, required=True, help="new folder")
     parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
     options = parser.parse_args(arguments)

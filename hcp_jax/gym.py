@@ -11,7 +11,7 @@ from hcp_jax.experiment.build import make_experiment
 
 
 def make_vector_env(config: Config, num_envs: int = 0, heldout: bool = False) -> PoolVectorEnv | GoalVectorEnv:
-    """The worlds that `config` trains on, or those of its held-out robots.
+    """The worlds of the robots that `config` trains on, or of its held-out ones. All episodes start where evaluations start.
 
     Args:
         config: its pool, task, encoding and physics are used.

@@ -9,7 +9,6 @@ from hcp_jax import command_line
 from hcp_jax.config import ConfigError
 from hcp_jax.evaluation.rehearsal import rehearse
 from hcp_jax.evaluation.statistics import write_json
-from hcp_jax.robot import OWN_ARM, add_chain_options
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -19,21 +18,23 @@ def main(arguments: list[str] | None = None) -> None:
     )
     parser.add_argument("run", type=pathlib.Path, help="run folder")
     parser.add_argument(
-        "--robot", required=True, help=f"I:3 (held-out robot 3 of a type), train:3 (training robot 3); or {OWN_ARM}"
+        "--robot",
+        required=True,
+        help=f"I:3 (held-out robot 3 of a type), train:3 (one trained on); or {command_line.OWN_ARM}",
     )
-    add_chain_options(parser)
+    command_line.add_chain_options(parser)
     parser.add_argument("--goals", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0, help="seed of goals, start poses, noise and jitter")
-    parser.add_argument("--json", type=pathlib.Path, help="file to write the whole record to")
+    parser.add_argument("--json", type=command_line.output_file, help="file to write the whole record to")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
         if options.goals < 1:
             raise ConfigError(f"--goals={options.goals}: expected at least 1")
         command_line.enable_compilation_cache()
         record = rehearse(options.run, options.robot, options.goals, options.base, options.tip, options.seed)
-    print_record(record)
-    if options.json:
-        write_json(options.json, record)
+        print_record(record)
+        if options.json:
+            write_json(options.json, record)
 
 
 def print_record(record: dict) -> None:

@@ -6,11 +6,9 @@ from hcp_jax import command_line
 from hcp_jax.config import ConfigError
 from hcp_jax.experiment.chosen_robots import Choice, read_choice
 from hcp_jax.hardware.catalogue import load_robot
-from hcp_jax.physics.base import INTEGRATORS, PHYSICS
 from hcp_jax.rendering.film import MAX_ROBOTS, check_output, write_film
 from hcp_jax.rendering.graphics import choose_backend
 from hcp_jax.rendering.recording import record_episodes
-from hcp_jax.robot import OWN_ARM, add_chain_options
 from hcp_jax.training.run_folder import read_config
 
 
@@ -22,11 +20,11 @@ def main(arguments: list[str] | None = None) -> None:
         "--robots", nargs="+", metavar="TYPE:ROW", help="held-out robots: H:3, hopper:0 (train:0: a hopper that was trained on)"
     )
     robots.add_argument("--grid", action="store_true", help="the first held-out robot of every type; nine hoppers")
-    robots.add_argument("--robot", help=OWN_ARM)
-    add_chain_options(parser)
+    robots.add_argument("--robot", help=command_line.OWN_ARM)
+    command_line.add_chain_options(parser)
     parser.add_argument("--out", type=pathlib.Path, required=True, help=".mp4, .gif, or .png for a few pictures in a row")
     parser.add_argument("--pictures", type=int, default=5, help="of each robot in a .png; 1 shows the ends of the episodes")
-    parser.add_argument("--physics", default="auto", choices=[*PHYSICS, *(f"native-{name}" for name in INTEGRATORS)])
+    command_line.add_physics_option(parser)
     parser.add_argument("--seed", type=int, default=0, help="seed of start poses, goals and noise")
     parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
     options = parser.parse_args(arguments)

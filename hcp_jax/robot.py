@@ -20,8 +20,6 @@ from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.robot_file import RobotFile
 from hcp_jax.training.run_folder import read_config
 
-OWN_ARM = f"your arm, a URDF or MJCF file (see hcp_jax.robot check), or one of {', '.join(catalogue_names())}"
-
 
 def main(arguments: list[str] | None = None) -> None:
     parser = command_line.OneLineParser(
@@ -31,10 +29,10 @@ def main(arguments: list[str] | None = None) -> None:
     )
     parser.add_argument("action", choices=["check"])
     parser.add_argument("file", help=f"URDF or MJCF, meshes may be missing; or one of {', '.join(catalogue_names())}")
-    add_chain_options(parser)
+    command_line.add_chain_options(parser)
     parser.add_argument("--policy", type=pathlib.Path, help="run or published policy whose training arms to compare with")
     parser.add_argument("--task", choices=list(CHAIN_TEMPLATES), default="reacher", help="else the paper's arms, of this task")
-    parser.add_argument("--json", type=pathlib.Path, help="file to write all of it to")
+    parser.add_argument("--json", type=command_line.output_file, help="file to write all of it to")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
         robot = load_robot(options.file, options.base, options.tip)
@@ -46,11 +44,6 @@ def main(arguments: list[str] | None = None) -> None:
         print_record(record)
         if options.json:
             write_json(options.json, record)
-
-
-def add_chain_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--base", help="link that stands still at the origin; default: the file's root, where it stands")
-    parser.add_argument("--tip", help="last link, whose origin is the point of interest; default: the end of the only chain")
 
 
 def describe(robot: RobotFile, own: RobotPool, trained: RobotPool) -> dict:

@@ -7,12 +7,12 @@ import pathlib
 import sys
 
 from hcp_jax import command_line
-from hcp_jax.config import Config, from_dict
+from hcp_jax.config import Config, ConfigError, from_dict
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.summary import summarise_runs
 from hcp_jax.ray_sweep import Job, run_on_ray
 from hcp_jax.training import loop, run_folder
-from hcp_jax.training.metrics import METRICS_FILE, read_rows
+from hcp_jax.training.checkpoint import latest_iteration
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -24,11 +24,13 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("list", help="Python file whose get_configs() gives the experiments; it will be executed")
     parser.add_argument("--seeds", type=int, default=1, help="seeds 0 to SEEDS-1 of each experiment")
     parser.add_argument("--out", type=pathlib.Path, help="folder of run folders (default: runs/LIST)")
-    parser.add_argument("--summary", type=pathlib.Path, help="JSON file for the table (default: OUT/summary.json)")
+    parser.add_argument("--summary", type=command_line.output_file, help="JSON file for the table (default: OUT/summary.json)")
     parser.add_argument("--ray", metavar="ADDRESS", help="run on this Ray cluster; `local`: on one of this machine's cores")
     parser.add_argument("--cpus-per-run", type=int, default=1, help="with --ray: cores that each run reserves")
     known, overrides = parser.parse_known_args(arguments)
     with command_line.user_errors_end_the_command():
+        if known.seeds < 1:
+            raise ConfigError(f"--seeds={known.seeds}: expected at least 1")
         configs = [command_line.apply_overrides(config, overrides) for config in command_line.load_configs(known.list)]
         command_line.enable_compilation_cache()
         out = known.out or pathlib.Path("runs") / pathlib.Path(known.list).stem
@@ -68,8 +70,9 @@ def run_experiment(config: Config, folder: pathlib.Path) -> bool:
     """Trains, resumes or skips one experiment. Returns whether the user interrupted it."""
     resume = (folder / run_folder.CONFIG_FILE).exists()
     if resume:
-        rows = read_rows(folder / METRICS_FILE)
-        if rows and int(rows[-1]["env_steps"]) >= config.total_env_steps:
+        run_folder.check_resumable(folder, config)
+        iterations = latest_iteration(folder / run_folder.CHECKPOINT_FOLDER) or 0
+        if iterations * config.batch_size >= config.total_env_steps:
             print(f"{folder}: done", flush=True)
             return False
     return loop.train(config, folder, resume) is None

@@ -1,5 +1,6 @@
 """Pools, engines and rollouts that several test files use, built and compiled once per session."""
 
+import functools
 import os
 import pathlib
 
@@ -27,6 +28,14 @@ from hcp_jax.training import loop
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 command_line.enable_compilation_cache()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled_once():
+    """A config's experiment is built, and its training step compiled, once per session, however often it is trained."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop, "make_experiment", functools.cache(loop.make_experiment))
+        yield
 
 
 @pytest.fixture(scope="session")

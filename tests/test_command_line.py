@@ -7,13 +7,14 @@ import shutil
 
 import pytest
 
-from hcp_jax import command_line, evaluate, train
+from hcp_jax import benchmark, command_line, evaluate, sweep, train
 from hcp_jax.config import Config, ConfigError, field_names, from_dict, to_dict
 
 EXPERIMENTS = pathlib.Path(__file__).resolve().parents[1] / "experiments"
 HOPPER = str(EXPERIMENTS / "hopper_ppo.py")
 REACHER = str(EXPERIMENTS / "reacher_hcpe_leave_h.py")
-PEG = str(EXPERIMENTS / "peg_hcpe_leave_h.py")
+PEG = str(EXPERIMENTS / "peg_jacobian_leave_h.py")
+POLICY = EXPERIMENTS.parent / "results" / "policies" / "reacher_hcpe_leave_h_s0"
 FINETUNE = str(EXPERIMENTS / "finetune.py")
 
 
@@ -108,6 +109,18 @@ BAD_ARGUMENTS = {
         ["--config", FINETUNE, "--config.encoding=chain+dynamics"],
         "encoding='chain+dynamics': expected one of none, chain,",
     ),
+    "identification by ddpg": (
+        ["--config", REACHER, "--config.embedding.identify_steps=1000"],
+        "embedding.identify_steps=1000: expected 0 for ddpg",
+    ),
+    "more robots than ids": (
+        ["--config", REACHER, "--config.pool.robots_per_type=10001"],
+        "pool.robots_per_type=10001: expected at most 10000",
+    ),
+    "init of other layers": (
+        ["--config", REACHER, f"--config.init={POLICY}", "--config.ddpg.layer_norm=False"],
+        "another architecture: its ddpg.layer_norm is True, the config's False",
+    ),
     "missing init": (["--config", HOPPER, "--config.init=nowhere"], "nowhere: no such run folder"),
     "resume of nothing": (["--config", HOPPER, "--resume"], "no such run folder"),
 }
@@ -170,6 +183,49 @@ def test_evaluate_refuses_other_robots_that_cannot_be_drawn_or_read(finished_run
     assert "another template" in fails(capsys, evaluate.main, [run, "--pool", str(tmp_path / "other")])
     (tmp_path / "pool" / "pool.npz").write_bytes(b"")
     assert "damaged" in fails(capsys, evaluate.main, [run, "--pool", str(tmp_path / "pool")])
+
+
+def test_a_record_that_could_not_be_written_is_refused_before_the_work(finished_run, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    for path in (tmp_path, tmp_path / "file" / "record.json", pathlib.Path("/proc/nowhere/record.json")):
+        line = fails(capsys, evaluate.main, [str(finished_run), "--json", str(path)])
+        assert f"argument --json: {path}: cannot be written (" in line
+    assert (tmp_path / "file").read_text() == ""
+
+
+def test_a_published_policy_has_no_best_checkpoint(capsys):
+    assert "is a published policy, which is one alone" in fails(capsys, evaluate.main, [str(POLICY), "--best"])
+
+
+def test_a_sweep_refuses_no_seeds_and_a_folder_of_another_setting(finished_run, tiny_config, tmp_path, capsys):
+    path = pathlib.Path(tiny_experiment(tmp_path, tiny_config))
+    path.write_text(path.read_text() + "def get_configs():\n    return [get_config()]\n")
+    arguments = [str(path), "--out", str(tmp_path / "runs")]
+    assert "--seeds=0: expected at least 1" in fails(capsys, sweep.main, [*arguments, "--seeds", "0"])
+    shutil.copytree(finished_run, tmp_path / "runs" / "tiny_s0")
+    line = fails(capsys, sweep.main, [*arguments, "--config.ppo.gamma=0.5"])
+    assert "tiny_s0 was started with ppo.gamma=0.99, not 0.5" in line
+
+
+def test_a_sweep_goes_on_with_a_run_that_lacks_its_last_checkpoint(finished_run, tiny_config, tmp_path, capsys):
+    folder = shutil.copytree(finished_run, tmp_path / "tiny_s0")
+    shutil.rmtree(folder / "checkpoints" / "newest" / "8")
+    sweep.run_experiment(tiny_config, folder)
+    assert (folder / "checkpoints" / "newest" / "8").is_dir()
+    sweep.run_experiment(tiny_config, folder)
+    assert capsys.readouterr().out.endswith(f"{folder}: done\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["physics", "--rows", "hcp_jax"], "--rows=hcp_jax: expected of physics: mj_step,"),
+        (["learner", "--rows", "native"], "--rows=native: expected of learner: none"),
+        (["scale", "--config", FINETUNE], "robot='panda': expected types of arms, or hoppers, for scale"),
+    ],
+)
+def test_a_benchmark_names_what_it_cannot_measure(arguments, expected, capsys):
+    assert expected in fails(capsys, benchmark.main, arguments)
 
 
 def test_a_run_never_overwrites_another(finished_run, tiny_config, tmp_path, capsys):

@@ -11,6 +11,7 @@ from flax import struct
 from hcp_jax.algorithms.replay import EpisodeBatch
 from hcp_jax.config import DDPGConfig
 from hcp_jax.devices import split_rows
+from hcp_jax.envs.base import draw_evenly
 from hcp_jax.envs.goal import GoalState, GoalTransition
 
 # (what was learned, index [B], obs [B, O], goal [B, G]) -> action [B, A]
@@ -102,10 +103,10 @@ class Explorer:
 
     def draw_robots(self, failure: jax.Array, key: jax.Array) -> jax.Array:
         """Robots for the next episodes: evenly, but for the share of those that fail. [B] int32."""
-        even = draw_evenly(key, self.env.num_robots, self.num_envs)
+        key_even, key_failing, key_choice = jax.random.split(key, 3)
+        even = draw_evenly(key_even, self.env.num_robots, self.num_envs)
         if not self.config.failing_share:
             return even
-        key_failing, key_choice = jax.random.split(jax.random.fold_in(key, 1))
         failing = jax.random.categorical(key_failing, jnp.log(failure + 1e-3), shape=even.shape).astype(jnp.int32)
         return jnp.where(jax.random.uniform(key_choice, even.shape) < self.config.failing_share, failing, even)
 
@@ -127,10 +128,3 @@ def update_failure(failure: jax.Array, index: jax.Array, failed: jax.Array) -> j
     count = jnp.zeros_like(failure).at[index].add(1.0)[index]
     step = jnp.minimum(FAILURE_STEP, 1.0 / count)
     return jnp.clip(failure.at[index].add(step * (failed - failure[index])), 0.0, 1.0)
-
-
-def draw_evenly(key: jax.Array, num_robots: int, num_envs: int) -> jax.Array:
-    """Robots for `num_envs` episodes, none twice before each was drawn once: [B] int32."""
-    keys = jax.random.split(key, -(-num_envs // num_robots))
-    rows = jax.vmap(lambda key: jax.random.permutation(key, num_robots))(keys)
-    return rows.reshape(-1)[:num_envs].astype(jnp.int32)

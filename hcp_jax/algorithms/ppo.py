@@ -32,7 +32,7 @@ from hcp_jax.algorithms.optimizers import make_ppo_optimizer
 from hcp_jax.algorithms.returns import compute_gae
 from hcp_jax.config import EmbeddingConfig, PPOConfig
 from hcp_jax.devices import put_everywhere, split_rows
-from hcp_jax.envs.base import EnvState, Transition
+from hcp_jax.envs.base import EnvState, Transition, draw_evenly
 from hcp_jax.policies.conditioning import Conditioning
 from hcp_jax.policies.distribution import gaussian_entropy, gaussian_log_prob, sample_gaussian
 from hcp_jax.policies.networks import ActorCritic
@@ -47,7 +47,6 @@ class Env(Protocol):
     action_size: int
     num_robots: int
 
-    def initial_index(self, key: jax.Array, num_envs: int) -> jax.Array: ...
     def reset(self, key: jax.Array, index: jax.Array) -> EnvState: ...
     def step(self, state: EnvState, action: jax.Array) -> tuple[EnvState, Transition]: ...
 
@@ -74,8 +73,8 @@ class PPOState:
     iteration: [] int32 iterations done; reserve: before the identification's end the actor to go on with, after it the one
     that robots were identified under, None without identification; model_statistics: of [obs, change of obs], the forward
     model's units, which stand still after the identification; diverged: [N] int32 episodes that each robot lost to non-finite
-    physics; overflow: [] int32 worlds that ever overflowed; skipped: updates that were not finite; sums: running sums of
-    metrics since they were last read.
+    physics; overflow: [] int32 control steps of worlds that overflowed; skipped: updates that were not finite; sums: running
+    sums of metrics since they were last read.
     """
 
     # What a policy needs, and fitting v_h of new robots to it.
@@ -170,7 +169,7 @@ class PPO:
             opt_state=self._optimizer.init(params),
             obs_statistics=running_statistics.init_state(spec),
             model_statistics=running_statistics.init_state(specs.Array((2 * self.env.observation_size,), jnp.float32)),
-            env_state=self.env.reset(key_env, self.env.initial_index(key_index, self.num_envs)),
+            env_state=self.env.reset(key_env, draw_evenly(key_index, self.env.num_robots, self.num_envs)),
             key=key,
             diverged=jnp.zeros(self.env.num_robots, jnp.int32),
             overflow=jnp.int32(0),

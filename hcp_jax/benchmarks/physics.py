@@ -10,7 +10,6 @@
 """
 
 import functools
-import os
 import statistics
 import time
 from collections.abc import Callable, Iterator
@@ -22,11 +21,12 @@ import mujoco.batch
 import numpy as np
 
 from hcp_jax.config import Config
-from hcp_jax.devices import split_rows
+from hcp_jax.devices import count_cores, split_rows
 from hcp_jax.experiment.arm import ArmExperiment
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.experiment.hopper import HopperExperiment, train_v_h
-from hcp_jax.physics.native import MJ_INTEGRATORS, get_batch_fields
+from hcp_jax.physics.base import MJ_INTEGRATORS
+from hcp_jax.physics.native import get_batch_fields
 
 ENGINES = ("native", "mjx-warp", "mjx-jax")
 ROWS = ("mj_step", "mujoco.batch", "mujoco.batch.expand", *ENGINES, "rollout")
@@ -142,7 +142,7 @@ def make_models(run: ArmExperiment | HopperExperiment, num_envs: int) -> tuple[l
 def make_batch(run: ArmExperiment | HopperExperiment, num_envs: int, expand: bool) -> Callable[[int], None]:
     """n control steps of `mujoco.batch` on all cores, on a model per robot or on one whose fields are expanded."""
     models, qpos, substeps = make_models(run, num_envs)
-    batch = mujoco.batch.Batch(models[0], num_envs, len(os.sched_getaffinity(0)))
+    batch = mujoco.batch.Batch(models[0], num_envs, count_cores())
     if expand:
         rows = np.arange(num_envs) % run.train_pool.num_robots
         for name, values in get_batch_fields(run.train_pool, models[0]).items():

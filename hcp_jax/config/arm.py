@@ -5,7 +5,7 @@ import dataclasses
 from hcp_jax.config.checks import is_at_least_zero, is_positive, require
 from hcp_jax.hardware.arm import ALL_TYPES
 from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS
-from hcp_jax.hardware.ranges import ArmRanges, ChainRanges
+from hcp_jax.hardware.ranges import TYPE_STRIDE, ArmRanges, ChainRanges
 from hcp_jax.physics.base import INTEGRATORS
 
 _OF_POSES = ("chain_fk", "chain_fk+jacobian", "chain_fk+jacobian+dynamics", "none+end_effector", "none+goal_offset")
@@ -48,6 +48,8 @@ class ArmPoolConfig:
             require(len(set(value)) == len(value), f"pool.{field}", value, "no type twice")
         for field in ("robots_per_type", "heldout_per_type"):
             require(getattr(self, field) >= 1, f"pool.{field}", getattr(self, field), "at least 1")
+        for field in ("robots_per_type", "heldout_per_type"):
+            require(getattr(self, field) <= TYPE_STRIDE, f"pool.{field}", getattr(self, field), f"at most {TYPE_STRIDE}")
         require(self.split in ("train", "new"), "pool.split", self.split, "'train' or 'new'")
 
     @property

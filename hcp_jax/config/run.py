@@ -25,7 +25,7 @@ class Config:
         name: default run folder, `runs/NAME`.
         task: `hopper`, `reacher` or `peg_insertion`.
         algorithm: `ppo` for the hopper, `ddpg` for the arms.
-        seed: seed of initialisation, training and evaluation noise.
+        seed: seed of initialisation and training. Evaluations have the same episodes whatever it is.
         total_env_steps: control steps over all environments; rounded up to whole iterations.
         num_envs: parallel environments; 0 stands for the number of training robots.
         physics: `auto`, `mjx-warp`, `mjx-jax` or `native`.
@@ -122,6 +122,7 @@ class Config:
             )
 
     def _check_ddpg(self) -> None:
+        require(self.embedding.identify_steps == 0, "embedding.identify_steps", self.embedding.identify_steps, "0 for ddpg")
         if self.ddpg.network == "joints":
             allowed = "chain_fk+jacobian"
             require(self.encoding == allowed, "encoding", self.encoding, f"{allowed} for ddpg.network=joints")

@@ -5,7 +5,7 @@ import mujoco
 from hcp_jax.experiment.chosen_robots import ChosenRobot
 from hcp_jax.hardware import chain, hopper
 from hcp_jax.hardware.arm_pool import read_pooled_chain
-from hcp_jax.physics.native import MJ_INTEGRATORS
+from hcp_jax.physics.base import MJ_INTEGRATORS
 
 
 def write_model(robot: ChosenRobot, sim_dt: float, integrator: str) -> str:

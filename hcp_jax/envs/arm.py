@@ -9,10 +9,10 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 
+from hcp_jax.hardware.chain import MAX_JOINTS
 from hcp_jax.hardware.start_poses import REACHER_GOALS
 
 CTRL_DT = 0.02  # [s]
-MAX_JOINTS = 7
 NUM_SUBSTEPS = {"rk4": 20, "implicitfast": 5, "euler": 20}
 HOLE = (0.6, 0.0, 0.0)  # [m] of peg insertion: the target of the peg's bottom, 0.05 m below the table top
 TARGET_ABOVE_TABLE = 0.1  # [m] the target above the origin of the template's table

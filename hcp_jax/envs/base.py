@@ -75,6 +75,13 @@ class Task(Protocol):
     def is_terminated(self, physics: PhysicsState) -> jax.Array: ...
 
 
+def draw_evenly(key: jax.Array, num_robots: int, num_envs: int) -> jax.Array:
+    """Robots for `num_envs` episodes, whole permutations of the pool: none twice before each was drawn once. [B] int32."""
+    keys = jax.random.split(key, -(-num_envs // num_robots))
+    rows = jax.vmap(lambda key: jax.random.permutation(key, num_robots))(keys)
+    return rows.reshape(-1)[:num_envs].astype(jnp.int32)
+
+
 class PoolEnv:
     """The environment of one task over one pool. Stateless: everything that changes is in `EnvState`."""
 
@@ -97,13 +104,6 @@ class PoolEnv:
             episode_return=jnp.zeros(num_envs),
             key=key,
         )
-
-    def initial_index(self, key: jax.Array, num_envs: int) -> jax.Array:
-        """Robots of the first episodes: whole permutations of the pool, so that every robot is there as often."""
-        repeats = -(-num_envs // self.num_robots)
-        keys = jax.random.split(key, repeats)
-        rows = jax.vmap(lambda k: jax.random.permutation(k, self.num_robots))(keys)
-        return rows.reshape(-1)[:num_envs].astype(jnp.int32)
 
     def step(self, state: EnvState, action: jax.Array) -> tuple[EnvState, Transition]:
         """One control step of every world; ended episodes restart with another robot."""

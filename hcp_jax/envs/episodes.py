@@ -9,7 +9,8 @@ from flax import struct
 
 from hcp_jax.devices import gather
 from hcp_jax.envs.base import PoolEnv
-from hcp_jax.physics.base import PhysicsOverflowError, PhysicsState
+from hcp_jax.errors import PhysicsOverflowError
+from hcp_jax.physics.base import PhysicsState
 
 # (obs [B, O], v_h [B, K]) -> action [B, A], of given policy parameters.
 PolicyFn = Callable[..., jax.Array]

@@ -15,7 +15,7 @@ from flax import struct
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from hcp_jax.envs.base import PoolEnv
+from hcp_jax.envs.base import PoolEnv, draw_evenly
 from hcp_jax.envs.goal import GoalEnv, GoalState
 from hcp_jax.physics.base import select_rows
 
@@ -98,7 +98,7 @@ class PoolVectorEnv(_VectorEnv):
 
     def _reset_worlds(self, key):
         key_robots, key_reset = jax.random.split(key)
-        state = self.env.reset(key_reset, self.env.initial_index(key_robots, self.num_envs))
+        state = self.env.reset(key_reset, draw_evenly(key_robots, self.env.num_robots, self.num_envs))
         return state, self._robot_inputs(state.index, state.obs)
 
     def _step_worlds(self, state, action):

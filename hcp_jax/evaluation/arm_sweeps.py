@@ -20,7 +20,7 @@ from hcp_jax.hardware.own_arm import make_own_pool
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.robot_file import RobotFile
 from hcp_jax.training import run_folder
-from hcp_jax.training.warm_start import load_policy
+from hcp_jax.training.policy_file import load_policy
 
 
 def evaluate_arms(
@@ -62,7 +62,7 @@ def evaluate_arms(
     run = make_experiment(config, physics)
     assert isinstance(run, ArmExperiment)
     iteration, state = load_policy(folder, run, best)
-    record = describe_evaluation(run, folder, iteration, trials, robots_per_trial, ranges, pool_folder)
+    record = describe_evaluation(run, folder, iteration, trials, robots_per_trial, ranges, pool_folder, seed, best)
     record |= {"types": {}, "robots": []}
     pools = choose_pools(run, trials * robots_per_trial, types, ranges, pool_folder, own_robots or {})
     for name, pool in pools.items():

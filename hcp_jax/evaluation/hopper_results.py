@@ -10,8 +10,8 @@ from hcp_jax.evaluation.publishing import group_by_name, plot_groups, publish_ru
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.summary import read_curve, read_run_commit, steps_to_reach, summarise_runs
 from hcp_jax.experiment.build import make_experiment
+from hcp_jax.training.policy_file import load_policy
 from hcp_jax.training.run_folder import read_config
-from hcp_jax.training.warm_start import load_policy
 
 LABEL = "return of one episode"
 

@@ -23,7 +23,7 @@ from hcp_jax.experiment.hopper import (
 )
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.training import run_folder
-from hcp_jax.training.warm_start import load_policy
+from hcp_jax.training.policy_file import load_policy
 
 
 def evaluate_hoppers(
@@ -66,7 +66,7 @@ def evaluate_hoppers(
     run = make_experiment(run_folder.read_config(folder), physics)
     assert isinstance(run, HopperExperiment)
     iteration, state = load_policy(folder, run, best)
-    record = describe_evaluation(run, folder, iteration, trials, robots_per_trial, ranges, pool_folder)
+    record = describe_evaluation(run, folder, iteration, trials, robots_per_trial, ranges, pool_folder, seed, best)
     record |= {"types": {}, "sets": {}, "robots": []}
     sets = choose_sets(run, state, trials * robots_per_trial, fit_steps, ranges, pool_folder)
     if first_steps:

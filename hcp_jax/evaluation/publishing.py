@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 from hcp_jax.evaluation.summary import average_curves, read_curve
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE
-from hcp_jax.training.policy_file import write_policy
+from hcp_jax.training.policy_file import load_policy, write_policy
 from hcp_jax.training.run_folder import CONFIG_FILE, ENVIRONMENT_FILE, read_config
-from hcp_jax.training.warm_start import load_policy
 
 
 def find_runs(runs: pathlib.Path) -> list[pathlib.Path]:

@@ -19,7 +19,7 @@ from hcp_jax.experiment.build import make_experiment
 from hcp_jax.experiment.chosen_robots import ChosenRobot, choose_robot
 from hcp_jax.hardware.chain import TIP_SITE
 from hcp_jax.training import run_folder
-from hcp_jax.training.warm_start import load_policy
+from hcp_jax.training.policy_file import load_policy
 
 SIM_DT = 0.001  # [s], with RK4: nothing was trained on it
 

@@ -26,6 +26,8 @@ def describe_evaluation(
     robots_per_trial: int,
     ranges: Sequence[RangeChange],
     pool_folder: pathlib.Path | None,
+    seed: int,
+    best: bool,
 ) -> dict:
     """What every record of an evaluation starts with: the policy of `folder` after `iteration` iterations, and its robots."""
     config = run.config
@@ -37,6 +39,8 @@ def describe_evaluation(
         "physics": run.physics,
         "integrator": chosen_integrator(run.physics, config.env.integrator),
         "checkpoint_env_steps": iteration * config.batch_size,
+        "best": best,
+        "seed": seed,
         "commit": run_folder.read_commit(),
         "trials": trials,
         "robots_per_trial": robots_per_trial,

@@ -10,10 +10,10 @@ from hcp_jax.config import Config, ConfigError, PoolConfig
 from hcp_jax.experiment.arm import ArmExperiment, make_heldout_arms
 from hcp_jax.experiment.hopper import HopperExperiment, make_heldout_pool
 from hcp_jax.hardware import arm, hopper
-from hcp_jax.hardware.arm_pool import TYPE_STRIDE
 from hcp_jax.hardware.catalogue import load_robot
 from hcp_jax.hardware.own_arm import make_own_pool
 from hcp_jax.hardware.pool import RobotPool, concatenate_pools
+from hcp_jax.hardware.ranges import TYPE_STRIDE
 
 TRAINED = "train"  # the kind of robots that a run was trained on
 _CHOICE = re.compile(r"(\w+):(\d+)")

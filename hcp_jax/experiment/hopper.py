@@ -11,7 +11,7 @@ import numpy as np
 
 from hcp_jax.algorithms.ppo import PPO, Params, PPOState, get_actor, put_actor
 from hcp_jax.config import Config, HopperConfig, PoolConfig
-from hcp_jax.devices import replicate
+from hcp_jax.devices import copy_tree, replicate
 from hcp_jax.envs.base import PoolEnv
 from hcp_jax.envs.episodes import Episodes, Evaluator
 from hcp_jax.envs.hopper import Hopper
@@ -236,8 +236,3 @@ def summarise(trained: Episodes, heldout: Episodes, fitted: Episodes | None) -> 
         metrics[f"{name}_return_std"] = None if episodes is None else float(episodes.episode_return.std())
         metrics[f"{name}_episode_length"] = None if episodes is None else float(episodes.episode_length.mean())
     return metrics
-
-
-def copy_tree(tree):
-    """Fresh buffers, so that donating them leaves the original alone."""
-    return jax.tree.map(jnp.copy, tree)

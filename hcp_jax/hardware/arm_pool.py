@@ -11,13 +11,12 @@ import numpy as np
 
 from hcp_jax.hardware.arm import ALL_TYPES, CHAIN_TYPES, arm_spec, sample_hardware
 from hcp_jax.hardware.chain import MAX_JOINTS, Chain, edit_spec, read_chain
-from hcp_jax.hardware.pool import RobotPool, robots_path, stack_models
+from hcp_jax.hardware.pool import RobotPool, repeat_poses, robots_path, stack_models
 from hcp_jax.hardware.random_chain import sample_reaching_chains
-from hcp_jax.hardware.ranges import SPLIT_STRIDE, SPLITS, ArmRanges, ChainRanges
+from hcp_jax.hardware.ranges import SPLIT_STRIDE, SPLITS, TYPE_STRIDE, ArmRanges, ChainRanges
 from hcp_jax.hardware.start_poses import start_angles
 
 CHAIN_TEMPLATES = {"reacher": "chain_reacher.xml", "peg_insertion": "chain_peg.xml"}
-TYPE_STRIDE = 10_000  # between robot ids of two types
 # What a pool's `hardware` has of a chain under the same name.
 _HARDWARE = ("joint_range", "torque_limit", "damping", "frictionloss", "armature")
 
@@ -46,9 +45,8 @@ def make_arm_pool(
         ids.append(SPLITS[split] * SPLIT_STRIDE + number * TYPE_STRIDE + np.arange(num_per_type))
         numbers += [number] * num_per_type
         starts.append(angles)
-    # As many start poses for all: those of arms that have fewer come more than once.
     most = max(angles.shape[1] for angles in starts)
-    starts = [angles[:, np.arange(most) % angles.shape[1]] for angles in starts]
+    starts = [repeat_poses(angles, most) for angles in starts]
     return make_chain_pool(CHAIN_TEMPLATES[task], chains, np.concatenate(ids), np.asarray(numbers), np.concatenate(starts))
 
 

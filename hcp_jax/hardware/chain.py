@@ -218,13 +218,17 @@ def _quat_of(rotation: np.ndarray) -> np.ndarray:
 
 
 def _torque_limit(model: mujoco.MjModel, joint: int) -> float:
-    """Largest torque of the motor on `joint`; without one what the joint allows (a URDF's effort), 0 if that is open."""
-    for actuator in range(model.nu):
-        if model.actuator_trnid[actuator, 0] == joint:
-            gain = abs(model.actuator_gear[actuator, 0] * model.actuator_gainprm[actuator, 0])
-            if model.actuator_ctrllimited[actuator]:
-                gain *= np.abs(model.actuator_ctrlrange[actuator]).max()
-            if model.actuator_forcelimited[actuator]:
-                gain = min(gain, np.abs(model.actuator_forcerange[actuator]).max())
-            return float(gain)
-    return float(np.abs(model.jnt_actfrcrange[joint]).max()) if model.jnt_actfrclimited[joint] else 0.0
+    """Largest torque of the actuator on `joint` within what the joint allows (a URDF's effort); 0 where neither says.
+
+    A motor's control is its force. That of a servo is an angle or a speed, and says nothing of its force.
+    """
+    limits = [np.abs(model.jnt_actfrcrange[joint]).max()] if model.jnt_actfrclimited[joint] else []
+    for actuator in np.flatnonzero(model.actuator_trnid[:, 0] == joint)[:1]:
+        gear = abs(model.actuator_gear[actuator, 0])
+        is_motor = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_NONE
+        if model.actuator_forcelimited[actuator]:
+            limits.append(gear * np.abs(model.actuator_forcerange[actuator]).max())
+        if is_motor and (model.actuator_ctrllimited[actuator] or not limits):
+            control = np.abs(model.actuator_ctrlrange[actuator]).max() if model.actuator_ctrllimited[actuator] else 1.0
+            limits.append(gear * abs(model.actuator_gainprm[actuator, 0]) * control)
+    return float(min(limits, default=0.0))

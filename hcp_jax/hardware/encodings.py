@@ -18,6 +18,8 @@ from hcp_jax.hardware.pool import RobotPool
 ENCODINGS = ("none", "kinematics", "kinematics+dynamics", "random")
 _DYNAMICS = ("body_mass", "frictionloss", "damping", "armature")
 _RANDOM_ENCODING_SEED = 7919
+# Where a pool's episodes start: as many poses as the pool's other robots have.
+_NOT_HARDWARE = {"start_angles", "approach_angles", "approach_goal"}
 
 
 def encode(pool: RobotPool, encoding: str, reference: RobotPool) -> np.ndarray:
@@ -60,9 +62,9 @@ def scale_to_unit(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
 
 def random_encoding(pool: RobotPool, width: int) -> np.ndarray:
     """Noise [N, width] keyed by the robot's own hardware, so a robot keeps its vector whatever pool it stands in."""
-    rows = []
+    names, rows = sorted(set(pool.hardware) - _NOT_HARDWARE), []
     for row in range(pool.num_robots):
-        parts = [np.ascontiguousarray(pool.hardware[name][row]).tobytes() for name in sorted(pool.hardware)]
+        parts = [np.ascontiguousarray(pool.hardware[name][row]).tobytes() for name in names]
         digest = np.frombuffer(b"".join(parts), np.uint32)
         rows.append(np.random.default_rng([_RANDOM_ENCODING_SEED, *digest]).uniform(size=width))
     return np.asarray(rows, np.float32)

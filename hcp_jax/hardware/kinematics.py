@@ -32,8 +32,8 @@ def joint_poses(chain_pos: jax.Array, chain_rotation: jax.Array, angles: jax.Arr
     Args:
         chain_pos: [..., 8, 3] and
         chain_rotation: [..., 8, 3, 3], the frame of each joint (turning about z) in that of the one before, at angle 0, and
-            last the point of interest's (`hcp_jax.hardware.arm.make_chain_pool`). An arm of n joints has its point of interest
-            at n and the identity after it.
+            last the point of interest's (`hcp_jax.hardware.arm_pool.make_chain_pool`). An arm of n joints has its point of
+            interest at n and the identity after it.
         angles: [..., 7] rad; those of missing joints are ignored where they are 0.
 
     Returns:

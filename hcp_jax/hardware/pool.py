@@ -173,7 +173,20 @@ def _array_fields(model: mujoco.MjModel) -> list[str]:
 
 
 def concatenate_pools(*pools: RobotPool) -> RobotPool:
-    """One pool of all robots, training robots before others. Raises PoolError for different templates."""
+    """One pool of all robots, in that order. Where some have fewer start poses, those come more than once.
+
+    Raises:
+        PoolError: their templates differ.
+    """
     if any(pool.template != pools[0].template for pool in pools):
         raise PoolError("pools of different templates cannot be concatenated")
+    poses = [pool.hardware["start_angles"].shape[1] for pool in pools if "start_angles" in pool.hardware]
+    if poses:
+        same = ({"start_angles": repeat_poses(pool.hardware["start_angles"], max(poses))} for pool in pools)
+        pools = tuple(pool.replace(hardware=pool.hardware | angles) for pool, angles in zip(pools, same, strict=True))
     return jax.tree.map(lambda *leaves: np.concatenate(leaves), *pools)
+
+
+def repeat_poses(angles: np.ndarray, count: int) -> np.ndarray:
+    """As many as `count` of the start poses [N, S, 7], from the first again after the last."""
+    return angles[:, np.arange(count) % angles.shape[1]]

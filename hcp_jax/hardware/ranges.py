@@ -12,9 +12,11 @@ Range = tuple[float, float]
 # robots there are, and robot 1_000_003 is held-out robot 3 of its seed.
 SPLITS = {"train": 0, "heldout": 1, "new": 2}
 SPLIT_STRIDE = 1_000_000
+TYPE_STRIDE = 10_000  # between robot ids of two types of arms
 
 
-# [m] Every link of the nominal arm is longer than this: a link may shrink but not turn round.
+# [m] The most that a range may take off a link. A link that is shorter than what is taken off turns round (arm.json says
+# by how much each may change: none does).
 SHORTEST_LINK_CHANGE = -0.25
 
 

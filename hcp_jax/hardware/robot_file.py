@@ -84,10 +84,11 @@ def read_robot_here(path: pathlib.Path, base: str | None, tip: str | None) -> Ro
     notes: list[str] = []
     root = parse_xml(path)
     spec = load_urdf(root) if root.tag == "robot" else load_mjcf(path, root, notes)
+    name_all(spec)
     names = [body.name for body in spec.bodies]
     for role, name in (("base", base), ("tip", tip)):
         if name is not None and name not in names:
-            raise RobotFileError(f"--{role}={name}: no such link; there are {', '.join(filter(None, names[1:]))}")
+            raise RobotFileError(f"--{role}={name}: no such link; there are {', '.join(names[1:])}")
     remove_all_but_bodies(spec)
     tip_body = spec.body(tip) if tip else find_tip(spec)
     path_bodies = bodies_towards(spec, tip_body)
@@ -184,6 +185,18 @@ def load_mjcf(path: pathlib.Path, root: ElementTree.Element, notes: list[str]) -
     return spec
 
 
+def name_all(spec: mujoco.MjSpec) -> None:
+    """Names bodies that have no name, as MJCF allows, by number; and joints after their body."""
+    bodies, joints = {body.name for body in spec.bodies}, {joint.name for joint in spec.joints}
+    for body in spec.bodies[1:]:
+        body.name = body.name or next(name for i in itertools.count(1) if (name := f"body{i}") not in bodies)
+        bodies.add(body.name)
+        for joint in body.joints:
+            endings = itertools.chain([""], (f"_{i}" for i in itertools.count(2)))
+            joint.name = joint.name or next(name for ending in endings if (name := body.name + ending) not in joints)
+            joints.add(joint.name)
+
+
 def check_references(folder: pathlib.Path, where: pathlib.Path, root: ElementTree.Element, seen: set[pathlib.Path]) -> None:
     """Raises RobotFileError where a file refers to one outside `folder`, and follows its includes."""
     compiler = root.find("compiler")
@@ -258,7 +271,7 @@ def fix_joints(spec: mujoco.MjSpec, moving: list[mujoco.MjsBody], notes: list[st
     for body in spec.bodies:
         for joint in list(body.joints):
             if body.name not in moving_names or joint.type == mujoco.mjtJoint.mjJNT_FREE:
-                fixed.append(joint.name or body.name)
+                fixed.append(joint.name)
                 for actuator in [a for a in spec.actuators if a.target == joint.name]:
                     spec.delete(actuator)
                 spec.delete(joint)

@@ -8,12 +8,18 @@ from typing import Protocol
 
 import jax
 import jax.numpy as jnp
+import mujoco
 from flax import struct
 
 from hcp_jax.hardware.pool import RobotPool
 
 PHYSICS = ("auto", "mjx-warp", "mjx-jax", "native")
-INTEGRATORS = ("euler", "rk4", "implicitfast")
+MJ_INTEGRATORS = {
+    "euler": mujoco.mjtIntegrator.mjINT_EULER,
+    "rk4": mujoco.mjtIntegrator.mjINT_RK4,
+    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+}
+INTEGRATORS = tuple(MJ_INTEGRATORS)
 # [rad, m, rad/s, m/s] Beyond it a state counts as diverged. MuJoCo says so at 1e10 only; until then the values would ruin the
 # statistics by which observations are whitened.
 MAX_VALUE = 1e3
@@ -99,13 +105,3 @@ def make_physics(name: str, pool: RobotPool, sim_dt: float, integrator: str) -> 
 
         return mjx.MjxPhysics(pool, sim_dt, integrator, impl=name.removeprefix("mjx-"))
     raise ValueError(f"physics={name!r}: expected one of {', '.join(PHYSICS)} or native-{{{'|'.join(INTEGRATORS)}}}")
-
-
-class PhysicsOverflowError(RuntimeError):
-    """Contacts or constraints were dropped because a buffer was too small."""
-
-    def __init__(self, num_worlds: int):
-        super().__init__(
-            f"{num_worlds} physics steps overflowed a contact or constraint buffer, so their results are wrong: "
-            "raise max_contacts or max_constraints of MjxPhysics (hcp_jax/physics/mjx.py) or the template's <size memory>"
-        )

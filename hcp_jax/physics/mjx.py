@@ -9,9 +9,9 @@ from jax.sharding import PartitionSpec
 from mujoco import mjx
 
 from hcp_jax.devices import ROWS, get_mesh, is_divisible
+from hcp_jax.errors import UserError
 from hcp_jax.hardware.pool import MEAN_INERTIA, RobotPool
-from hcp_jax.physics.base import PhysicsState
-from hcp_jax.physics.native import MJ_INTEGRATORS
+from hcp_jax.physics.base import MJ_INTEGRATORS, PhysicsState
 
 # Fields of a pool that MJX does not read: bounding volume trees, lights, and what it cannot batch (STACK.md).
 _NOT_IN_MJX = (MEAN_INERTIA, "bvh_aabb", "light_poscom0", "dof_length", "dof_M0")
@@ -43,12 +43,12 @@ class MjxPhysics:
         """Args:
         pool: the robots that will be stepped.
         sim_dt: physics time step [s].
-        integrator: a key of `MJ_INTEGRATORS`.
+        integrator: one of `INTEGRATORS`.
         impl: `warp` or `jax`.
         max_contacts, max_constraints: Warp's buffer sizes per world (contacts are shared by all worlds).
         """
         if impl == "warp" and not has_warp():
-            raise ValueError("physics='mjx-warp': warp-lang is not installed; install mujoco-mjx[warp] or use mjx-jax")
+            raise UserError("physics='mjx-warp': warp-lang is not installed; install mujoco-mjx[warp] or use mjx-jax")
         self._impl = impl
         self._mj_model = pool.template_model()
         self._mj_model.opt.timestep = sim_dt

@@ -1,6 +1,5 @@
 """Native MuJoCo on all CPU cores, called from inside jitted code."""
 
-import os
 import threading
 
 import jax
@@ -9,19 +8,14 @@ import mujoco
 import mujoco.batch
 import numpy as np
 
-from hcp_jax.devices import ROWS, get_mesh
-from hcp_jax.hardware.pool import MEAN_INERTIA, RobotPool
-from hcp_jax.physics.base import PhysicsState
+from hcp_jax.devices import ROWS, count_cores, get_mesh
+from hcp_jax.hardware.pool import MEAN_INERTIA, PoolError, RobotPool
+from hcp_jax.physics.base import MJ_INTEGRATORS, PhysicsState
 
 _WARNING = mujoco.mjtWarning
 _DIVERGED = [int(_WARNING.mjWARN_BADQPOS), int(_WARNING.mjWARN_BADQVEL), int(_WARNING.mjWARN_BADQACC)]
 _OVERFLOWED = [int(_WARNING.mjWARN_CONTACTFULL), int(_WARNING.mjWARN_CNSTRFULL)]
 _COUNT = 1  # of the two numbers per warning: last info, count
-MJ_INTEGRATORS = {
-    "euler": mujoco.mjtIntegrator.mjINT_EULER,
-    "rk4": mujoco.mjtIntegrator.mjINT_RK4,
-    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
-}
 
 
 class NativePhysics:
@@ -39,7 +33,7 @@ class NativePhysics:
         self._row_order = np.argsort(pool.robot_id)
         self._sorted_ids = np.asarray(pool.robot_id)[self._row_order]
         if np.any(np.diff(self._sorted_ids) == 0):
-            raise ValueError("a pool with two robots of one id cannot be simulated")
+            raise PoolError("a pool with two robots of one id cannot be simulated")
         self._worlds: dict[tuple[int, int], _Worlds] = {}  # by device and number
         self._lock = threading.Lock()
 
@@ -95,7 +89,7 @@ class _Worlds:
     """B simulations on a thread pool; remembers which robots stand in them."""
 
     def __init__(self, model: mujoco.MjModel, num_worlds: int):
-        num_threads = max(1, len(os.sched_getaffinity(0)) // jax.local_device_count())
+        num_threads = max(1, count_cores() // jax.local_device_count())
         self._batch = mujoco.batch.Batch(model, num_worlds, num_threads)
         self._rows = np.full(num_worlds, -1)
         self._lock = threading.Lock()

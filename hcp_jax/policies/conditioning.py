@@ -3,10 +3,8 @@
 import jax
 import jax.numpy as jnp
 
-from hcp_jax.hardware.encodings import ENCODINGS, encode
+from hcp_jax.hardware.encodings import encode
 from hcp_jax.hardware.pool import RobotPool
-
-CONDITIONINGS = (*ENCODINGS, "embedding")
 
 
 class Encoding:

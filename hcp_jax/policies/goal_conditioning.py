@@ -21,13 +21,12 @@ import numpy as np
 from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS, encode_arms
 from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
 from hcp_jax.hardware.pool import RobotPool
+from hcp_jax.hardware.random_chain import GRAVITY
 from hcp_jax.policies.conditioning import Embedding
 
 MOTOR_LOADS = "chain_fk+jacobian+dynamics"
 POSE_FEATURES = {"chain_fk": 57, "chain_fk+jacobian": 109, MOTOR_LOADS: 137, "none+end_effector": 3, "none+goal_offset": 3}
-GOAL_CONDITIONINGS = (*ARM_ENCODINGS, *POSE_FEATURES, "embedding")
 OFFSET_SCALE = 0.02  # [m]
-GRAVITY = 9.81  # [m/s^2]
 _DYNAMICS = ("link_mass", "link_com", "torque_limit", "damping", "frictionloss", "armature")
 
 
@@ -45,7 +44,7 @@ class GoalConditioning:
     ):
         """Args:
         pool: the robots that `index` will name.
-        encoding: one of `GOAL_CONDITIONINGS`.
+        encoding: one of `hcp_jax.config.arm.ARM_CONDITIONINGS`.
         reference: the training robots, whose ranges scale dynamics.
         embedding: the learned table, for `embedding`.
         """

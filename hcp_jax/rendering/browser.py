@@ -18,7 +18,7 @@ from hcp_jax.rendering.drawing import ARM_FLOOR, GOAL_GEOMS, OPEN_GOAL, REACHED_
 from hcp_jax.rendering.graphics import GraphicsError
 from hcp_jax.rendering.live import LiveArm
 from hcp_jax.training import run_folder
-from hcp_jax.training.warm_start import load_policy
+from hcp_jax.training.policy_file import load_policy
 
 SETTLE_SECONDS = 0.3  # since the last change of a slider, before the arm is built anew
 _SLIDER_STEP = 0.005  # [m]

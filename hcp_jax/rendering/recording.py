@@ -19,7 +19,7 @@ from hcp_jax.hardware.own_arm import make_own_pool
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.robot_file import RobotFile
 from hcp_jax.training import run_folder
-from hcp_jax.training.warm_start import load_policy
+from hcp_jax.training.policy_file import load_policy
 
 _NUM_HOPPERS = 9  # in a grid
 

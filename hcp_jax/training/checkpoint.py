@@ -1,5 +1,6 @@
 """Checkpoints: asynchronous and atomic, the newest few and the best, with a fall-back past damaged ones."""
 
+import itertools
 import logging
 import pathlib
 from collections.abc import Mapping
@@ -66,11 +67,16 @@ class Checkpoints:
         return self._best.latest_step()
 
     def restore_best(self, template: TrainingState) -> tuple[int, TrainingState]:
-        """The policy with the highest return or success, in `template`. Raises CheckpointError if there is none."""
+        """The policy with the highest return or success, in `template`. Raises CheckpointError if none can be read."""
         iteration = self.best()
         if iteration is None:
             raise CheckpointError(f"{self.folder}: holds no best checkpoint")
-        return iteration, self._read_checked(self._best, template, iteration, policy_only=True)
+        try:
+            return iteration, self._read_checked(self._best, template, iteration, policy_only=True)
+        except CheckpointError:
+            raise
+        except Exception as error:
+            raise CheckpointError(f"{self.folder}: the best checkpoint, {iteration}, cannot be read ({_say(error)})") from error
 
     def restore(self, template: TrainingState, policy_only: bool = False) -> tuple[int, TrainingState, list[str]]:
         """Reads the newest checkpoint that can be read. Damaged ones are moved aside, unless this is read-only.
@@ -94,16 +100,17 @@ class Checkpoints:
             except CheckpointError:
                 raise
             except Exception as error:  # orbax and tensorstore raise many kinds for damaged files
-                reason = one_line(error)[:160] or type(error).__name__
-                skipped.append(f"checkpoint {iteration} cannot be read and is passed over ({reason})")
+                skipped.append(f"checkpoint {iteration} cannot be read and is passed over ({_say(error)})")
                 self._move_aside(iteration)
         raise CheckpointError(f"{self.folder}: no readable checkpoint; {skipped[0]}")
 
     def _move_aside(self, iteration: int) -> None:
         if not self._read_only:
-            aside = self.folder / "damaged" / str(iteration)
-            if is_main() and not aside.exists():
-                aside.parent.mkdir(exist_ok=True)
+            if is_main():
+                damaged = self.folder / "damaged"
+                damaged.mkdir(exist_ok=True)
+                names = itertools.chain([f"{iteration}"], (f"{iteration}_{number}" for number in itertools.count(2)))
+                aside = next(damaged / name for name in names if not (damaged / name).exists())
                 (self.folder / "newest" / str(iteration)).rename(aside)
             any_process(False)  # the others wait for it
             self._newest.reload()
@@ -132,6 +139,16 @@ class Checkpoints:
         saved = {leaf_name(path): tuple(leaf.shape) for path, leaf in jax.tree_util.tree_leaves_with_path(metadata.tree)
                  if hasattr(leaf, "shape")}  # fmt: skip
         check_architecture(saved, template, f"{self.folder}/{iteration}")
+
+
+def latest_iteration(folder: pathlib.Path) -> int | None:
+    """The number of iterations of the newest checkpoint in the `checkpoints/` folder of a run, without reading it."""
+    finished = [int(path.name) for path in folder.glob("newest/*") if path.name.isdecimal()]
+    return max(finished, default=None)
+
+
+def _say(error: Exception) -> str:
+    return one_line(error)[:160] or type(error).__name__
 
 
 def check_architecture(saved: Mapping[str, tuple[int, ...]], template: TrainingState, where: str) -> None:

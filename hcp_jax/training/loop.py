@@ -13,6 +13,7 @@ import math
 import pathlib
 import signal
 import threading
+from collections.abc import Iterator
 
 import jax
 import jax.numpy as jnp
@@ -20,11 +21,11 @@ import numpy as np
 
 from hcp_jax.config import Config
 from hcp_jax.devices import any_process, do_in_main, is_main
+from hcp_jax.errors import NonFiniteError, PhysicsOverflowError
 from hcp_jax.experiment.base import Experiment, TrainingState
 from hcp_jax.experiment.build import make_experiment
-from hcp_jax.physics.base import PhysicsOverflowError
 from hcp_jax.training import run_folder
-from hcp_jax.training.checkpoint import Checkpoints
+from hcp_jax.training.checkpoint import Checkpoints, latest_iteration
 from hcp_jax.training.curves import plot_curves
 from hcp_jax.training.metrics import MetricsWriter
 from hcp_jax.training.progress import Progress, format_seconds, say
@@ -35,20 +36,23 @@ _CHUNK_ENV_STEPS = 250_000
 _NUM_NAMED = 3  # robots that an error names
 
 
-class NonFiniteError(RuntimeError):
-    """Losses or gradients were not finite in too many updates in a row."""
-
-
 @dataclasses.dataclass
 class Interrupt:
-    """Set by Ctrl-C or SIGTERM: the loop ends after the current chunk."""
+    """Set by Ctrl-C or SIGTERM within its context: the loop ends after the current chunk."""
 
     requested: bool = False
 
-    def install(self) -> None:
-        if threading.current_thread() is threading.main_thread():
-            for name in (signal.SIGINT, signal.SIGTERM):
-                signal.signal(name, self._request)
+    @contextlib.contextmanager
+    def installed(self) -> Iterator["Interrupt"]:
+        if threading.current_thread() is not threading.main_thread():
+            yield self
+            return
+        before = {name: signal.signal(name, self._request) for name in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield self
+        finally:
+            for name, handler in before.items():
+                signal.signal(name, handler)
 
     def _request(self, *_) -> None:
         if self.requested:
@@ -60,7 +64,7 @@ def train(config: Config, folder: pathlib.Path, resume: bool = False) -> dict[st
     """Trains `config` in `folder`, which all processes that train together see and process 0 writes.
 
     Returns:
-        The last evaluation's metrics, or None if the run was interrupted (a checkpoint is saved then).
+        The last evaluation's metrics, or None if there was none: the run was interrupted, and saved, or was at its end already.
 
     Raises:
         RunFolderError, CheckpointError: the folder cannot be used; nothing was written.
@@ -68,7 +72,8 @@ def train(config: Config, folder: pathlib.Path, resume: bool = False) -> dict[st
         NonFiniteError: losses or gradients stopped being finite; the newest checkpoint is from before.
     """
     do_in_main(lambda: run_folder.check_resumable(folder, config) if resume else run_folder.check_new(folder))
-    init = load_init(config) if config.init else None
+    goes_on = resume and latest_iteration(folder / run_folder.CHECKPOINT_FOLDER) is not None
+    init = load_init(config) if config.init and not goes_on else None
     say(f"{config.name}: compiling {config.pool.num_robots + config.pool.num_heldout} robots")
     run = make_experiment(config)
     state = run.init_state()
@@ -97,9 +102,8 @@ def _run(run: Experiment, state: TrainingState, folder: pathlib.Path, resume: bo
         say(f"resuming at {iteration * run.config.batch_size:,} steps")
     elif resume:
         say("the run ended before its first checkpoint: starting again")
-    interrupt = Interrupt()
-    interrupt.install()
-    return TrainingLoop(run, folder, checkpoints, iteration).run(state, interrupt)
+    with Interrupt().installed() as interrupt:
+        return TrainingLoop(run, folder, checkpoints, iteration).run(state, interrupt)
 
 
 class TrainingLoop:

@@ -1,13 +1,15 @@
-"""A policy without the state of its training: one file, small enough to publish, and data only."""
+"""A policy without the state of its training: read from a run's checkpoints, or from one file that can be published."""
 
 import pathlib
+from typing import Any
 
 import flax.serialization
 import jax
 import numpy as np
 
-from hcp_jax.experiment.base import TrainingState
-from hcp_jax.training.checkpoint import CheckpointError, check_architecture, leaf_name
+from hcp_jax.experiment.base import Experiment, TrainingState
+from hcp_jax.training import run_folder
+from hcp_jax.training.checkpoint import CheckpointError, Checkpoints, check_architecture, leaf_name
 
 POLICY_FILE = "policy.msgpack"
 
@@ -37,3 +39,28 @@ def read_policy(folder: pathlib.Path, template: TrainingState) -> TrainingState:
     return template.replace(
         **flax.serialization.from_state_dict({name: getattr(template, name) for name in template.policy_fields}, fields)
     )
+
+
+def load_policy(folder: pathlib.Path, run: Experiment, best: bool = False) -> tuple[int, Any]:
+    """An initial state with the newest readable policy of a run folder, or its best one, and its number of iterations.
+
+    A folder may also be a published policy: one with `policy.msgpack` instead of checkpoints. Raises CheckpointError.
+    """
+    checkpoint_folder = folder / run_folder.CHECKPOINT_FOLDER
+    if not checkpoint_folder.is_dir():
+        if (folder / POLICY_FILE).exists():
+            if best:
+                raise CheckpointError(f"--best: {folder} is a published policy, which is one alone")
+            state = read_policy(folder, run.init_state())
+            return int(state.iteration), state
+        raise CheckpointError(f"{folder}: holds no checkpoint")
+    checkpoints = Checkpoints(checkpoint_folder, read_only=True)
+    try:
+        if best:
+            return checkpoints.restore_best(run.init_state())
+        iteration, state, skipped = checkpoints.restore(run.init_state(), policy_only=True)
+        for line in skipped:
+            print(line, flush=True)
+        return iteration, state
+    finally:
+        checkpoints.close()

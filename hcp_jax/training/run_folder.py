@@ -13,7 +13,8 @@ from collections.abc import Iterator
 
 import jax
 
-from hcp_jax.config import Config, ConfigError, from_dict, to_dict
+from hcp_jax.config import Config, from_dict, to_dict
+from hcp_jax.devices import count_cores
 from hcp_jax.errors import UserError
 
 CONFIG_FILE = "config.json"
@@ -73,7 +74,7 @@ def read_config(folder: pathlib.Path) -> Config:
         raise RunFolderError(f"{folder}: not a run folder (it has no {CONFIG_FILE})")
     try:
         return from_dict(Config, json.loads(path.read_text()))
-    except (json.JSONDecodeError, ConfigError) as error:
+    except (ValueError, TypeError) as error:
         raise RunFolderError(f"{path}: damaged or of another version ({error})") from error
 
 
@@ -97,11 +98,20 @@ def describe_environment(physics: str) -> dict:
         "command": sys.argv,
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "cpu_cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "cpu": read_cpu_name(),
+        "cpu_cores": count_cores(),
         "devices": [f"{device.platform}:{device.device_kind}" for device in jax.devices()],
         "physics": physics,
         "versions": versions,
     }
+
+
+def read_cpu_name() -> str:
+    """The processor's model as Linux names it, elsewhere its architecture."""
+    path = pathlib.Path("/proc/cpuinfo")
+    lines = path.read_text().splitlines() if path.exists() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
 
 
 def read_commit() -> str | None:

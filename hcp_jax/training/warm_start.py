@@ -1,4 +1,4 @@
-"""Starting a run from another run's hidden layers (paper, section 5.2: transfer to new agents)."""
+"""Starting a run from another run's layers (paper, section 5.2: transfer to new agents)."""
 
 import pathlib
 from collections.abc import Callable
@@ -10,35 +10,12 @@ import jax.numpy as jnp
 from hcp_jax.algorithms.ddpg import DDPGState
 from hcp_jax.algorithms.ppo import PPOState, get_actor, put_actor
 from hcp_jax.config import Config
-from hcp_jax.experiment.base import Experiment, TrainingState
+from hcp_jax.devices import copy_tree
+from hcp_jax.experiment.base import TrainingState
 from hcp_jax.experiment.build import make_experiment
-from hcp_jax.experiment.hopper import copy_tree
 from hcp_jax.training import run_folder
-from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
-from hcp_jax.training.policy_file import POLICY_FILE, read_policy
-
-
-def load_policy(folder: pathlib.Path, run: Experiment, best: bool = False) -> tuple[int, Any]:
-    """An initial state with the newest readable policy of a run folder, or its best one, and its number of iterations.
-
-    A folder may also be a published policy: one with `policy.msgpack` instead of checkpoints.
-    """
-    checkpoint_folder = folder / run_folder.CHECKPOINT_FOLDER
-    if not checkpoint_folder.is_dir():
-        if (folder / POLICY_FILE).exists():
-            state = read_policy(folder, run.init_state())
-            return int(state.iteration), state
-        raise CheckpointError(f"{folder}: holds no checkpoint")
-    checkpoints = Checkpoints(checkpoint_folder, read_only=True)
-    try:
-        if best:
-            return checkpoints.restore_best(run.init_state())
-        iteration, state, skipped = checkpoints.restore(run.init_state(), policy_only=True)
-        for line in skipped:
-            print(line, flush=True)
-        return iteration, state
-    finally:
-        checkpoints.close()
+from hcp_jax.training.checkpoint import CheckpointError
+from hcp_jax.training.policy_file import load_policy
 
 
 def load_init(config: Config) -> Callable[[Any, TrainingState], TrainingState]:
@@ -52,15 +29,26 @@ def load_init(config: Config) -> Callable[[Any, TrainingState], TrainingState]:
     """
     folder = pathlib.Path(config.init)
     source_config = run_folder.read_config(folder)
-    for field in ("task", "encoding", f"{config.algorithm}.hidden_sizes", "embedding.size"):
+    for field in ("task", "encoding", *_architecture(config)):
         old, new = _get(source_config, field), _get(config, field)
         if old != new:
             raise CheckpointError(f"init={config.init}: another architecture: its {field} is {old!r}, the config's {new!r}")
-    if bool(source_config.embedding.identify_steps) != bool(config.embedding.identify_steps):
+    identified = {bool(each.embedding.identify_steps) for each in (source_config, config)}
+    if config.encoding == "embedding" and len(identified) > 1:
         raise CheckpointError(f"init={config.init}: its v_h was learned in another way (embedding.identify_steps)")
     source = load_policy(folder, make_experiment(source_config))[1]
     start = _start_ppo if config.algorithm == "ppo" else _start_ddpg
     return lambda run, state: start(source, state, config.init_layers == "all")
+
+
+def _architecture(config: Config) -> tuple[str, ...]:
+    """Fields that say what the networks are and what they see."""
+    if config.algorithm == "ppo":
+        fields = ("ppo.hidden_sizes", "ppo.normalize_observation")
+    else:
+        names = ("network", "hidden_sizes", "layer_norm", "normalize_inputs", "double_critic")
+        fields = tuple(f"ddpg.{name}" for name in names)
+    return (*fields, "embedding.size") if config.encoding == "embedding" else fields
 
 
 def _start_ppo(source: PPOState, state: PPOState, all_layers: bool) -> PPOState:

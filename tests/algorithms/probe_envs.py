@@ -18,9 +18,6 @@ class ProbeEnv:
     def __init__(self, length: int, reward: Callable[..., jax.Array], truncates: bool = False):
         self._length, self._reward, self._truncates = length, reward, truncates
 
-    def initial_index(self, key: jax.Array, num_envs: int) -> jax.Array:
-        return jnp.arange(num_envs, dtype=jnp.int32) % self.num_robots
-
     def reset(self, key: jax.Array, index: jax.Array) -> EnvState:
         step = jnp.zeros(index.shape, jnp.int32)
         return EnvState(

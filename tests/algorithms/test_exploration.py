@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from goal_probes import PlaneEnv
 
-from hcp_jax.algorithms.exploration import Explorer, draw_evenly, update_failure
+from hcp_jax.algorithms.exploration import Explorer, update_failure
 from hcp_jax.config import DDPGConfig
 
 
@@ -53,9 +53,3 @@ def test_all_actions_are_uniform_before_the_policy_is_warm(key):
     cold, warm = (play(explorer, is_warm, key) for is_warm in (False, True))
     assert abs(float(cold.std()) - 1 / np.sqrt(3)) < 0.1
     np.testing.assert_array_equal(warm, 0.0)
-
-
-def test_robots_are_drawn_without_favour(key):
-    drawn = draw_evenly(key, 4, 10)
-    np.testing.assert_array_equal(np.sort(drawn[:4]), np.arange(4))
-    np.testing.assert_array_equal(np.sort(drawn[4:8]), np.arange(4))

@@ -22,7 +22,7 @@ from hcp_jax.hardware.arm_pool import make_arm_pool
 from hcp_jax.hardware.pool import robots_path
 from hcp_jax.hardware.ranges import ArmRanges
 from hcp_jax.training import run_folder
-from hcp_jax.training.warm_start import load_policy
+from hcp_jax.training.policy_file import load_policy
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 ARM = 3  # held-out robot of type H, which the policy was not trained on

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from hcp_jax.envs.base import PoolEnv
+from hcp_jax.envs.base import PoolEnv, draw_evenly
 from hcp_jax.envs.hopper import Hopper
 from hcp_jax.physics.base import PhysicsState, make_physics
 
@@ -116,13 +116,13 @@ def test_diverged_physics_ends_the_episode_with_finite_numbers(env, step, key):
         assert np.isfinite(leaf).all()
 
 
-def test_the_first_episodes_hold_every_robot_equally_often(env, key):
-    index = np.asarray(env.initial_index(key, 3 * 64))
-    assert np.bincount(index, minlength=64).tolist() == [3] * 64
+def test_robots_are_drawn_without_favour(key):
+    drawn = draw_evenly(key, 4, 10)
+    np.testing.assert_array_equal(np.sort(drawn[:4]), np.arange(4))
+    np.testing.assert_array_equal(np.sort(drawn[4:8]), np.arange(4))
 
 
-def test_the_pool_of_the_first_step_is_drawn_from_the_key(env, key):
-    one, same = env.initial_index(key, 20), env.initial_index(key, 20)
-    other = env.initial_index(jax.random.key(9), 20)
+def test_the_robots_of_the_first_step_are_drawn_from_the_key(key):
+    one, same, other = (draw_evenly(seed, 64, 20) for seed in (key, key, jax.random.key(9)))
     np.testing.assert_array_equal(one, same)
     assert not np.array_equal(one, other)

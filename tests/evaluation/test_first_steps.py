@@ -9,7 +9,7 @@ from hcp_jax.config import ConfigError
 from hcp_jax.evaluation.first_steps import act, fit_v_h, regress_v_h
 from hcp_jax.evaluation.hopper_sweeps import evaluate_hoppers
 from hcp_jax.experiment.build import make_experiment
-from hcp_jax.training.warm_start import load_policy
+from hcp_jax.training.policy_file import load_policy
 
 
 @pytest.fixture(scope="module")

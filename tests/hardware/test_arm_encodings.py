@@ -46,3 +46,8 @@ def test_dynamics_span_0_to_1_and_are_0_for_missing_joints(arms):
     assert dynamics.min() == 0.0
     assert dynamics.max() == pytest.approx(1.0)
     np.testing.assert_array_equal(dynamics[:3, :, 5:], 0.0)
+
+
+def test_a_robot_keeps_its_random_vector_beside_robots_with_other_start_poses():
+    alone, beside = (make_arm_pool("reacher", ArmRanges(), types, 1, seed=0) for types in (("R5",), ("R5", "H")))
+    np.testing.assert_array_equal(encode_arms(alone, "random", alone)[0], encode_arms(beside, "random", beside)[0])

@@ -3,9 +3,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from hcp_jax.hardware.arm_pool import make_arm_pool
 from hcp_jax.hardware.hopper import compile_models, make_hopper_pool
 from hcp_jax.hardware.pool import PoolError, RobotPool, concatenate_pools, stack_models
-from hcp_jax.hardware.ranges import HopperRanges
+from hcp_jax.hardware.ranges import ArmRanges, HopperRanges
 
 
 def test_rebuilt_models_equal_the_compiled_ones_in_every_array(pool):
@@ -67,3 +68,12 @@ def test_pools_of_different_templates_do_not_mix(pool):
 
 def test_the_template_is_a_valid_model(pool):
     assert isinstance(pool.template_model(), mujoco.MjModel)
+
+
+def test_pools_of_arms_with_different_numbers_of_start_poses_concatenate():
+    chain, arm = (make_arm_pool("reacher", ArmRanges(), (name,), 1, seed=0) for name in ("R5", "H"))
+    poses = concatenate_pools(chain, arm).hardware["start_angles"]
+    few = chain.hardware["start_angles"][0]
+    assert len(few) < poses.shape[1]
+    np.testing.assert_array_equal(poses[0], np.resize(few, poses[0].shape))
+    np.testing.assert_array_equal(poses[1], arm.hardware["start_angles"][0])

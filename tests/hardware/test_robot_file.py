@@ -6,7 +6,7 @@ import pytest
 from robot_texts import MJCF, arm, joint, link, robot
 
 from hcp_jax.hardware.pool import robots_path
-from hcp_jax.hardware.robot_file import RobotFileError, read_robot, read_robot_here
+from hcp_jax.hardware.robot_file import ASSUMED_TORQUE_LIMITS, RobotFileError, read_robot, read_robot_here
 
 BOMB = '<?xml version="1.0"?><!DOCTYPE b [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><robot name="&b;"/>'
 FORK = robot(*(link(f"l{i}") for i in range(3)), joint("j0", "l0", "l1"), joint("j1", "l0", "l2"))
@@ -108,6 +108,32 @@ def test_what_a_file_leaves_open_is_assumed_and_said(tmp_path):
     np.testing.assert_allclose(robot_file.chain.torque_limit, 80.0)
     np.testing.assert_allclose(robot_file.chain.damping, [1.0, 0.5])
     np.testing.assert_allclose(robot_file.chain.joint_range, [[-np.pi, np.pi]] * 2)
+
+
+def test_bodies_and_joints_may_be_without_a_name(tmp_path):
+    text = MJCF
+    for name in ("l0", "l1", "l2", "j0", "j1"):
+        text = text.replace(f' name="{name}"', "")
+    text = text[: text.index("<actuator>")] + "</mujoco>"
+    read, named = read_robot(write(tmp_path, text)), read_robot(write(tmp_path, MJCF))
+    assert (read.joints, read.base, read.tip) == (("body2", "body3"), "body1", "body3")
+    np.testing.assert_allclose(read.chain.pos, named.chain.pos)
+
+
+@pytest.mark.parametrize(
+    ("actuator", "expected"),
+    [
+        ('<motor joint="j0" ctrlrange="-20 20" ctrllimited="true"/>', 20.0),
+        ('<motor joint="j0" gear="50" ctrlrange="-1 1" ctrllimited="true" forcerange="-2 2" forcelimited="true"/>', 50.0),
+        ('<position joint="j0" kp="2000" ctrlrange="-3 3" ctrllimited="true"/>', ASSUMED_TORQUE_LIMITS[0]),
+        ('<position joint="j0" kp="2000" forcerange="-30 30" forcelimited="true"/>', 30.0),
+    ],
+)
+def test_a_torque_limit_is_what_the_motor_can_give_and_not_what_a_servo_is_told(actuator, expected, tmp_path):
+    text = MJCF.replace('<motor joint="j0" ctrlrange="-20 20" ctrllimited="true"/>', actuator)
+    assert read_robot(write(tmp_path, text)).chain.torque_limit[0] == expected
+    capped = text.replace('name="j0"', 'name="j0" actuatorfrcrange="-5 5" actuatorfrclimited="true"')
+    assert read_robot(write(tmp_path, capped)).chain.torque_limit[0] == 5.0
 
 
 @pytest.mark.slow

@@ -4,11 +4,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from hcp_jax.config.arm import ARM_CONDITIONINGS
 from hcp_jax.hardware.arm_pool import make_arm_pool
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.ranges import ArmRanges
 from hcp_jax.policies.conditioning import Embedding
-from hcp_jax.policies.goal_conditioning import GOAL_CONDITIONINGS, GoalConditioning
+from hcp_jax.policies.goal_conditioning import GoalConditioning
 
 LENGTHS = {
     "none": 0,
@@ -64,7 +65,7 @@ def end_effectors(arms: RobotPool, angles: np.ndarray) -> np.ndarray:
 
 
 def test_every_encoding_is_as_long_as_documented(arms, angles):
-    assert {name: features(arms, name, angles).shape[1] for name in GOAL_CONDITIONINGS} == LENGTHS
+    assert {name: features(arms, name, angles).shape[1] for name in ARM_CONDITIONINGS} == LENGTHS
 
 
 def test_the_controls_see_the_end_effector_and_nothing_else_of_the_robot(arms, angles):

@@ -18,8 +18,8 @@ from hcp_jax.rendering import film, graphics
 from hcp_jax.rendering.drawing import OPEN_GOAL
 from hcp_jax.rendering.film import frame_steps, open_painters, write_film
 from hcp_jax.rendering.recording import Recording, record_episodes
+from hcp_jax.training.policy_file import load_policy
 from hcp_jax.training.run_folder import read_config
-from hcp_jax.training.warm_start import load_policy
 
 
 @pytest.fixture(scope="module")

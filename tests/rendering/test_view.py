@@ -9,8 +9,8 @@ from hcp_jax.experiment.build import make_experiment
 from hcp_jax.hardware.arm import LINKS
 from hcp_jax.rendering.browser import ArmView
 from hcp_jax.rendering.live import make_one_arm
+from hcp_jax.training.policy_file import load_policy
 from hcp_jax.training.run_folder import read_config
-from hcp_jax.training.warm_start import load_policy
 
 
 @pytest.fixture(scope="module")

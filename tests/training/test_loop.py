@@ -3,6 +3,7 @@ import dataclasses
 import json
 import pathlib
 import shutil
+import signal
 
 import jax
 import jax.numpy as jnp
@@ -10,11 +11,11 @@ import numpy as np
 import pytest
 
 from hcp_jax.algorithms.ppo import get_actor
-from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training import loop
 from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
 from hcp_jax.training.loop import Interrupt, TrainingLoop
-from hcp_jax.training.warm_start import load_init, load_policy
+from hcp_jax.training.policy_file import load_policy
+from hcp_jax.training.warm_start import load_init
 
 
 def metrics(folder: pathlib.Path) -> list[dict]:
@@ -50,7 +51,7 @@ def test_the_newest_checkpoints_and_the_best_are_kept(finished_run, tiny_config)
 def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished_run, tiny_config, tmp_path, cut):
     """Cut after `cut` of 8 iterations: between two evaluations and at one."""
     folder = tmp_path / "run"
-    run = make_experiment(tiny_config)
+    run = loop.make_experiment(tiny_config)
     interrupt = Interrupt()
     checkpoints = Checkpoints(folder / "checkpoints")
     loop.run_folder.write_start(folder, tiny_config, run.physics)
@@ -86,6 +87,41 @@ def test_a_damaged_checkpoint_is_passed_over_with_a_line(finished_run, tiny_conf
     assert (folder / "metrics.csv").read_bytes() == (finished_run / "metrics.csv").read_bytes()
 
 
+def test_a_checkpoint_damaged_again_is_moved_aside_again(finished_run, tiny_config, tmp_path):
+    folder = shutil.copytree(finished_run, tmp_path / "run")
+    for _ in range(2):
+        for path in (folder / "checkpoints" / "newest" / "8").rglob("*"):
+            if path.is_file():
+                path.write_bytes(b"")
+        loop.train(tiny_config, folder, resume=True)
+    assert {path.name for path in (folder / "checkpoints" / "damaged").iterdir()} == {"8", "8_2"}
+    assert (folder / "checkpoints" / "newest" / "8").is_dir()
+
+
+def test_a_damaged_best_checkpoint_is_said_in_one_line(finished_run, tiny_config, tmp_path):
+    folder = shutil.copytree(finished_run, tmp_path / "run")
+    for path in (folder / "checkpoints" / "best").rglob("*"):
+        if path.is_file():
+            path.write_bytes(b"")
+    with pytest.raises(CheckpointError, match=r"best checkpoint, \d, cannot be read"):
+        load_policy(folder, loop.make_experiment(tiny_config), best=True)
+
+
+def test_signals_are_what_they_were_once_training_ends(finished_run, tiny_config, tmp_path):
+    before = [signal.getsignal(name) for name in (signal.SIGINT, signal.SIGTERM)]
+    folder = shutil.copytree(finished_run, tmp_path / "run")
+    loop.train(tiny_config, folder, resume=True)
+    assert [signal.getsignal(name) for name in (signal.SIGINT, signal.SIGTERM)] == before
+
+
+def test_a_resumed_run_does_not_need_the_run_that_it_started_from(finished_run, tiny_config, tmp_path):
+    source = shutil.copytree(finished_run, tmp_path / "source")
+    config = dataclasses.replace(tiny_config, init=str(source), total_env_steps=256)
+    loop.train(config, tmp_path / "run")
+    shutil.rmtree(source)
+    assert loop.train(dataclasses.replace(config, total_env_steps=384), tmp_path / "run", resume=True) is not None
+
+
 def test_a_longer_run_may_continue_a_shorter_one(finished_run, tiny_config, tmp_path):
     folder = shutil.copytree(finished_run, tmp_path / "run")
     loop.train(dataclasses.replace(tiny_config, total_env_steps=640), folder, resume=True)
@@ -93,7 +129,7 @@ def test_a_longer_run_may_continue_a_shorter_one(finished_run, tiny_config, tmp_
 
 
 def test_heldout_robots_do_not_depend_on_the_training_seed(tiny_config):
-    one, other = (make_experiment(dataclasses.replace(tiny_config, seed=seed)) for seed in (0, 1))
+    one, other = (loop.make_experiment(dataclasses.replace(tiny_config, seed=seed)) for seed in (0, 1))
     jax.tree.map(np.testing.assert_array_equal, one.heldout_pool, other.heldout_pool)
     jax.tree.map(np.testing.assert_array_equal, one.train_pool, other.train_pool)
 
@@ -102,8 +138,8 @@ def test_heldout_robots_do_not_depend_on_the_training_seed(tiny_config):
 def warm(finished_run, tiny_config):
     """A warm-started experiment on new robots, its state at the start, and the state that it starts from."""
     config = dataclasses.replace(tiny_config, init=str(finished_run), pool=dataclasses.replace(tiny_config.pool, split="new"))
-    run = make_experiment(config)
-    return run, load_init(config)(run, run.init_state()), load_policy(finished_run, make_experiment(tiny_config))[1]
+    run = loop.make_experiment(config)
+    return run, load_init(config)(run, run.init_state()), load_policy(finished_run, loop.make_experiment(tiny_config))[1]
 
 
 def test_a_warm_start_takes_hidden_layers_and_leaves_output_layers_and_embeddings_new(warm):
@@ -120,8 +156,8 @@ def test_a_warm_start_takes_hidden_layers_and_leaves_output_layers_and_embedding
 
 def test_a_warm_start_of_all_layers_takes_the_output_layers_too(finished_run, tiny_config):
     config = dataclasses.replace(tiny_config, init=str(finished_run), init_layers="all")
-    run = make_experiment(config)
-    state, source = load_init(config)(run, run.init_state()), load_policy(finished_run, make_experiment(tiny_config))[1]
+    run = loop.make_experiment(config)
+    state, source = load_init(config)(run, run.init_state()), load_policy(finished_run, loop.make_experiment(tiny_config))[1]
     trained = get_actor(source.params, source.obs_statistics).network
     jax.tree.map(np.testing.assert_array_equal, state.reserve.network, trained)
 
@@ -152,7 +188,7 @@ def test_a_resumed_arm_run_ends_as_the_uninterrupted_one_replay_buffer_included(
     loop.train(dataclasses.replace(tiny_arms, total_env_steps=160), folder)
     loop.train(tiny_arms, folder, resume=True)
     assert (folder / "metrics.csv").read_bytes() == (finished_arms / "metrics.csv").read_bytes()
-    run = make_experiment(tiny_arms)
+    run = loop.make_experiment(tiny_arms)
     read = [Checkpoints(path / "checkpoints", read_only=True).restore(run.init_state()) for path in (folder, finished_arms)]
     one, other = (state.replay for _, state, _ in read)
     jax.tree.map(np.testing.assert_array_equal, one, other)
@@ -160,8 +196,8 @@ def test_a_resumed_arm_run_ends_as_the_uninterrupted_one_replay_buffer_included(
 
 def test_a_policy_is_read_from_a_checkpoint_whatever_else_training_keeps(finished_arms, tiny_arms):
     larger = dataclasses.replace(tiny_arms, ddpg=dataclasses.replace(tiny_arms.ddpg, buffer_episodes=50))
-    run = make_experiment(larger)
-    whole = Checkpoints(finished_arms / "checkpoints", read_only=True).restore(make_experiment(tiny_arms).init_state())[1]
+    run = loop.make_experiment(larger)
+    whole = Checkpoints(finished_arms / "checkpoints", read_only=True).restore(loop.make_experiment(tiny_arms).init_state())[1]
     _, state = load_policy(finished_arms, run)
     for name in state.policy_fields:
         jax.tree.map(np.testing.assert_array_equal, getattr(state, name), getattr(whole, name))
@@ -170,7 +206,7 @@ def test_a_policy_is_read_from_a_checkpoint_whatever_else_training_keeps(finishe
 
 def test_arms_start_from_the_layers_of_another_run(finished_arms, tiny_arms):
     config = dataclasses.replace(tiny_arms, init=str(finished_arms))
-    run = make_experiment(config)
+    run = loop.make_experiment(config)
     state, source = load_init(config)(run, run.init_state()), load_policy(finished_arms, run)[1]
     actor, old = (params["actor"]["params"] for params in (state.params, source.params))
     np.testing.assert_array_equal(actor["hidden_0"]["kernel"], old["hidden_0"]["kernel"])

@@ -12,7 +12,6 @@ import pytest
 
 from hcp_jax import train
 from hcp_jax.algorithms.guard import apply_update, init_skipped
-from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training import loop, run_folder
 from hcp_jax.training.checkpoint import Checkpoints
 from hcp_jax.training.run_folder import RunFolderError
@@ -51,7 +50,7 @@ def test_a_run_whose_updates_stay_non_finite_ends_and_names_a_robot(
     config = dataclasses.replace(config, max_skipped_updates=3, total_env_steps=2 * config.total_env_steps)
     folder = tmp_path / "run"
     shutil.copytree(finished, folder)
-    run = make_experiment(config)
+    run = loop.make_experiment(config)
     checkpoints = Checkpoints(folder / run_folder.CHECKPOINT_FOLDER)
     iteration, state, _ = checkpoints.restore(run.init_state())
     broken = jax.tree.map(lambda leaf: jnp.full_like(leaf, jnp.nan), state.params)
