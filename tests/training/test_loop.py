@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from hcp_jax.algorithms.ppo import get_actor
+from hcp_jax.config import to_dict
 from hcp_jax.training import loop
 from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
 from hcp_jax.training.loop import Interrupt, TrainingLoop
@@ -114,12 +115,12 @@ def test_signals_are_what_they_were_once_training_ends(finished_run, tiny_config
     assert [signal.getsignal(name) for name in (signal.SIGINT, signal.SIGTERM)] == before
 
 
-def test_a_resumed_run_does_not_need_the_run_that_it_started_from(finished_run, tiny_config, tmp_path):
-    source = shutil.copytree(finished_run, tmp_path / "source")
-    config = dataclasses.replace(tiny_config, init=str(source), total_env_steps=256)
-    loop.train(config, tmp_path / "run")
-    shutil.rmtree(source)
-    assert loop.train(dataclasses.replace(config, total_env_steps=384), tmp_path / "run", resume=True) is not None
+def test_a_resumed_run_does_not_need_the_run_that_it_started_from(finished_run, tiny_config, tmp_path, capsys):
+    folder = shutil.copytree(finished_run, tmp_path / "run")
+    config = dataclasses.replace(tiny_config, init=str(tmp_path / "gone"))
+    (folder / "config.json").write_text(json.dumps(to_dict(config)))
+    loop.train(config, folder, resume=True)
+    assert "resuming at 512 steps" in capsys.readouterr().out
 
 
 def test_a_longer_run_may_continue_a_shorter_one(finished_run, tiny_config, tmp_path):
