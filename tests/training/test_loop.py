@@ -115,14 +115,6 @@ def test_signals_are_what_they_were_once_training_ends(finished_run, tiny_config
     assert [signal.getsignal(name) for name in (signal.SIGINT, signal.SIGTERM)] == before
 
 
-def test_a_resumed_run_does_not_need_the_run_that_it_started_from(finished_run, tiny_config, tmp_path, capsys):
-    folder = shutil.copytree(finished_run, tmp_path / "run")
-    config = dataclasses.replace(tiny_config, init=str(tmp_path / "gone"))
-    (folder / "config.json").write_text(json.dumps(to_dict(config)))
-    loop.train(config, folder, resume=True)
-    assert "resuming at 512 steps" in capsys.readouterr().out
-
-
 def test_a_longer_run_may_continue_a_shorter_one(finished_run, tiny_config, tmp_path):
     folder = shutil.copytree(finished_run, tmp_path / "run")
     loop.train(dataclasses.replace(tiny_config, total_env_steps=640), folder, resume=True)
@@ -193,6 +185,14 @@ def test_a_resumed_arm_run_ends_as_the_uninterrupted_one_replay_buffer_included(
     read = [Checkpoints(path / "checkpoints", read_only=True).restore(run.init_state()) for path in (folder, finished_arms)]
     one, other = (state.replay for _, state, _ in read)
     jax.tree.map(np.testing.assert_array_equal, one, other)
+
+
+def test_a_resumed_run_does_not_need_the_run_that_it_started_from(finished_arms, tiny_arms, tmp_path, capsys):
+    folder = shutil.copytree(finished_arms, tmp_path / "run")
+    config = dataclasses.replace(tiny_arms, init=str(tmp_path / "gone"))
+    (folder / "config.json").write_text(json.dumps(to_dict(config)))
+    loop.train(config, folder, resume=True)
+    assert "resuming at 320 steps" in capsys.readouterr().out
 
 
 def test_a_policy_is_read_from_a_checkpoint_whatever_else_training_keeps(finished_arms, tiny_arms):
