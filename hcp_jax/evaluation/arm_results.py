@@ -4,7 +4,8 @@ import pathlib
 from collections.abc import Sequence
 
 from hcp_jax.evaluation.appendix import make_appendix
-from hcp_jax.evaluation.publishing import group_by_name, plot_groups, publish_runs
+from hcp_jax.evaluation.groups import group_folders
+from hcp_jax.evaluation.publishing import describe_published, plot_groups, publish_runs
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.summary import SUCCESSES, summarise_runs
 from hcp_jax.evaluation.table1 import make_table1
@@ -12,7 +13,7 @@ from hcp_jax.training.run_folder import read_config
 
 
 def collect_arms(folders: Sequence[pathlib.Path], results: pathlib.Path) -> list[str]:
-    """Adds the arms' run folders to `results`; returns a line for each thing written.
+    """Adds the arms' run folders, which may be none, to `results`; returns a line for each thing written.
 
     Each run's metrics under `arms/runs/` and its policy under `policies/`; from all runs there, `arms/summary.json` (a row per
     experiment) and `arms/TASK.png` (curves of each task's experiments); and `table1.json` and `appendix.json`, of the policies
@@ -20,14 +21,16 @@ def collect_arms(folders: Sequence[pathlib.Path], results: pathlib.Path) -> list
     """
     out = results / "arms"
     published = publish_runs(folders, out, results / "policies")
+    if not published:
+        return []
     write_json(out / "summary.json", summarise_runs(published))
     for task in dict.fromkeys(read_config(folder).task for folder in published):
-        groups = group_by_name([folder for folder in published if read_config(folder).task == task])
+        groups = group_folders([folder for folder in published if read_config(folder).task == task])
         plot_groups(groups, out / f"{task}.png", SUCCESSES, "success [%] on held-out robots")
-    written = [f"{out}/runs, {results}/policies: {', '.join(folder.name for folder in folders)}"]
+    written = [describe_published(folders, out, results / "policies")] if folders else []
     for name, make_rows in (("table1", make_table1), ("appendix", make_appendix)):
         rows = make_rows(results)
         write_json(results / f"{name}.json", rows)
         written.append(f"{results}/{name}.json: {len(rows)} rows")
-    written.append(f"{out}/summary.json: {', '.join(group_by_name(published))}")
+    written.append(f"{out}/summary.json: {', '.join(group_folders(published))}")
     return written

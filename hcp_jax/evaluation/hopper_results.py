@@ -1,12 +1,15 @@
 """What is published of the hopper: tables, curves and pictures from run folders."""
 
+import itertools
 import pathlib
 from collections.abc import Sequence
 
 import numpy as np
 
+from hcp_jax.config import Config
 from hcp_jax.evaluation.embedding import knn_r2, plot_embedding
-from hcp_jax.evaluation.publishing import group_by_name, plot_groups, publish_runs
+from hcp_jax.evaluation.groups import group_by_settings, group_folders, label_groups
+from hcp_jax.evaluation.publishing import describe_published, plot_groups, publish_runs
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.summary import read_curve, read_run_commit, steps_to_reach, summarise_runs
 from hcp_jax.experiment.build import make_experiment
@@ -17,45 +20,47 @@ LABEL = "return of one episode"
 
 
 def collect_hoppers(folders: Sequence[pathlib.Path], results: pathlib.Path) -> list[str]:
-    """Adds the hopper's run folders to `results`; returns a line for each thing written.
+    """Adds the hopper's run folders, which may be none, to `results`; returns a line for each thing written.
 
     Each run's metrics under `hopper/runs/` and its policy under `policies/`; from all runs there, `hopper/summary.json` (a row
-    per algorithm), `hopper/curves.png`, and `hopper/finetune.json` and `.png` if there are runs of 100 new hoppers. If a run of
-    `hopper_embedding` is added, `hopper/embedding.json` and `.png`.
+    per algorithm), `hopper/curves.png`, `hopper/finetune.json` and `.png` if there are runs of 100 new hoppers, and
+    `hopper/embedding.json` and `.png` if there is one of `hopper_embedding`.
     """
-    out = results / "hopper"
-    published = publish_runs(folders, out, results / "policies")
-    written = [f"{out}/runs, {results}/policies: {', '.join(folder.name for folder in folders)}"]
-    by_name = group_by_name(published)
-    new_robots = [folder for folder in published if read_config(folder).pool.split == "new"]
-    main = {name: group for name, group in by_name.items() if name != "hopper_embedding" and group[0] not in new_robots}
+    out, policies = results / "hopper", results / "policies"
+    published = publish_runs(folders, out, policies)
+    written = [describe_published(folders, out, policies)] if folders else []
+    configs = {folder: read_config(folder) for folder in published}
+    new_robots = [folder for folder, config in configs.items() if config.pool.split == "new"]
+    embeddings = [folder for folder, config in configs.items() if config.name == "hopper_embedding"]
+    main = [folder for folder in published if folder not in (*new_robots, *embeddings)]
     if main:
-        write_json(out / "summary.json", summarise_runs([folder for group in main.values() for folder in group]))
-        plot_groups(main, out / "curves.png", ("train_return_mean", "heldout_return_mean"), LABEL)
-        written.append(f"{out}/summary.json, {out}/curves.png: {', '.join(main)}")
+        groups = group_folders(main)
+        write_json(out / "summary.json", summarise_runs(main))
+        plot_groups(groups, out / "curves.png", ("train_return_mean", "heldout_return_mean"), LABEL)
+        written.append(f"{out}/summary.json, {out}/curves.png: {', '.join(groups)}")
     if new_robots:
         written.append(write_finetune(new_robots, out))
-    for folder in group_by_name(folders).get("hopper_embedding", ())[:1]:
-        written.append(write_embedding(folder, out))
+    if embeddings:
+        written.append(write_embedding(policies / embeddings[0].name, out))
     return written
 
 
 def write_finetune(folders: Sequence[pathlib.Path], out: pathlib.Path) -> str:
-    """Steps at which runs from a pretrained one reach the final return of the run from scratch of the same seed."""
+    """Steps at which runs from a pretrained one reach the final return of each run from scratch of the same seed."""
     configs = {folder: read_config(folder) for folder in folders}
-    scratch = {config.seed: folder for folder, config in configs.items() if not config.init}
+    scratch = [folder for folder, config in configs.items() if not config.init]
     if not scratch:
         return "no run from scratch to compare fine-tuning with"
-    groups: dict[str, list[pathlib.Path]] = {"from scratch": list(scratch.values())}
     rows = []
-    for folder, config in configs.items():
-        if not config.init or config.seed not in scratch:
+    for from_scratch, folder in itertools.product(scratch, folders):
+        config = configs[folder]
+        if not config.init or config.seed != configs[from_scratch].seed:
             continue
-        groups.setdefault(f"pretrained, {config.init_layers} layers", []).append(folder)
-        goal, curve = read_curve(scratch[config.seed], "train_return_mean")[-1], read_curve(folder, "train_return_mean")
+        goal, curve = read_curve(from_scratch, "train_return_mean")[-1], read_curve(folder, "train_return_mean")
         rows.append(
             {
                 "run": folder.name,
+                "scratch_run": from_scratch.name,
                 "seed": config.seed,
                 "init_layers": config.init_layers,
                 "scratch_final_return": round(float(goal[1]), 1),
@@ -66,9 +71,17 @@ def write_finetune(folders: Sequence[pathlib.Path], out: pathlib.Path) -> str:
                 "commit": read_run_commit(folder),
             }
         )
+    groups = group_by_settings([*scratch, *(folder for folder in folders if folder not in scratch)], configs.__getitem__)
+    starts = [name_start(configs[group[0]]) for group in groups]
+    labels = label_groups(starts, [[folder.name for folder in group] for group in groups])
     write_json(out / "finetune.json", rows)
-    plot_groups(groups, out / "finetune.png", ("train_return_mean",), LABEL)
+    plot_groups(dict(zip(labels, groups, strict=True)), out / "finetune.png", ("train_return_mean",), LABEL)
     return f"{out}/finetune.json, {out}/finetune.png: {rows}"
+
+
+def name_start(config: Config) -> str:
+    """Where a run of new hoppers starts from."""
+    return f"pretrained, {config.init_layers} layers" if config.init else "from scratch"
 
 
 def write_embedding(folder: pathlib.Path, out: pathlib.Path) -> str:

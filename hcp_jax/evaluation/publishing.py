@@ -1,16 +1,18 @@
 """What every task publishes of its run folders: metrics, policies and curves."""
 
 import pathlib
-import shutil
 from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
 
 from hcp_jax.evaluation.summary import average_curves, read_curve
+from hcp_jax.experiment.base import TrainingState
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE
 from hcp_jax.training.policy_file import load_policy, write_policy
 from hcp_jax.training.run_folder import CONFIG_FILE, ENVIRONMENT_FILE, read_config
+
+_FILES = (CONFIG_FILE, ENVIRONMENT_FILE, TIMING_FILE, METRICS_FILE)  # of a run, the one last that makes it one to be found
 
 
 def find_runs(runs: pathlib.Path) -> list[pathlib.Path]:
@@ -19,35 +21,36 @@ def find_runs(runs: pathlib.Path) -> list[pathlib.Path]:
 
 
 def publish_runs(folders: Sequence[pathlib.Path], out: pathlib.Path, policies: pathlib.Path) -> list[pathlib.Path]:
-    """Copies each run's metrics to `out/runs` and writes its policy to `policies`.
+    """Writes each run's newest policy to `policies` and copies its metrics to `out/runs`.
+
+    All of `folders` are read before anything is written: one that cannot be read leaves the results as they were.
 
     Returns:
         all folders of `out/runs`, those of earlier calls too: what tables and curves are made of.
     """
-    for folder in folders:
-        copy_files(folder, out / "runs" / folder.name, (CONFIG_FILE, ENVIRONMENT_FILE, METRICS_FILE, TIMING_FILE))
-        publish_policy(folder, policies / folder.name)
+    read = [(folder.name, *_read_run(folder)) for folder in folders]
+    for name, files, state in read:
+        _write_files(policies / name, {key: files[key] for key in (CONFIG_FILE, ENVIRONMENT_FILE)})
+        write_policy(policies / name, state)
+        _write_files(out / "runs" / name, files)
     return find_runs(out / "runs")
 
 
-def group_by_name(folders: Sequence[pathlib.Path]) -> dict[str, list[pathlib.Path]]:
-    """Runs of one experiment with different seeds, by the experiment's name."""
-    groups: dict[str, list[pathlib.Path]] = {}
-    for folder in folders:
-        groups.setdefault(read_config(folder).name, []).append(folder)
-    return groups
+def describe_published(folders: Sequence[pathlib.Path], out: pathlib.Path, policies: pathlib.Path) -> str:
+    """A line about what `publish_runs` wrote."""
+    return f"{out}/runs, {policies}: {', '.join(folder.name for folder in folders)}"
 
 
-def copy_files(source: pathlib.Path, target: pathlib.Path, names: Sequence[str]) -> None:
-    target.mkdir(parents=True, exist_ok=True)
-    for name in names:
-        shutil.copy(source / name, target / name)
+def _read_run(folder: pathlib.Path) -> tuple[dict[str, bytes], TrainingState]:
+    """The files of a run that are published, and a state that holds its newest policy."""
+    files = {name: (folder / name).read_bytes() for name in _FILES}
+    return files, load_policy(folder, make_experiment(read_config(folder)))[1]
 
 
-def publish_policy(folder: pathlib.Path, target: pathlib.Path) -> None:
-    """Writes the newest policy of a run, with its config and environment, to `target`."""
-    copy_files(folder, target, (CONFIG_FILE, ENVIRONMENT_FILE))
-    write_policy(target, load_policy(folder, make_experiment(read_config(folder)))[1])
+def _write_files(folder: pathlib.Path, files: Mapping[str, bytes]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
 
 
 def plot_groups(groups: Mapping[str, Sequence[pathlib.Path]], path: pathlib.Path, columns: Sequence[str], label: str) -> None:

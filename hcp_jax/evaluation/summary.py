@@ -1,6 +1,5 @@
 """One row per algorithm from run folders: what `results/*/summary.json` holds."""
 
-import collections
 import dataclasses
 import json
 import pathlib
@@ -9,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hcp_jax.config import Config
+from hcp_jax.evaluation.groups import group_by_settings
 from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE, read_rows
 from hcp_jax.training.run_folder import ENVIRONMENT_FILE, read_config
 
@@ -28,39 +28,43 @@ SUCCESSES = ("train_types_success", "left_out_success")
 
 
 def summarise_runs(folders: Sequence[pathlib.Path]) -> list[dict]:
-    """Groups finished runs by configuration (seed aside) and averages their last evaluations.
+    """Groups evaluated runs by configuration (seed aside) and length, and averages their last evaluations.
 
     Returns:
-        Rows with `algorithm`, `encoding`, `name`, `seeds`, `env_steps`, mean and standard deviation over seeds of each
-        return in `RETURNS` (hopper) or success in percent in `SUCCESSES` (arms), `wall_seconds` (mean) and `commit`.
+        Rows with `algorithm`, `encoding`, `name`, `runs` (folders), `seeds`, `env_steps`, mean and sample standard deviation
+        over seeds (None for a single one) of each return in `RETURNS` (hopper) or success in percent in `SUCCESSES` (arms),
+        `wall_seconds` (mean) and `commit`.
     """
-    groups = collections.defaultdict(list)
-    for folder in folders:
-        rows = read_rows(folder / METRICS_FILE)
-        if rows:
-            config = read_config(folder)
-            groups[(config.name, int(rows[-1]["env_steps"]))].append((config, folder, rows[-1]))
-    return [_summarise_group(name, env_steps, runs) for (name, env_steps), runs in groups.items()]
+    runs = [(read_config(folder), folder, rows[-1]) for folder in folders if (rows := read_rows(folder / METRICS_FILE))]
+    groups = group_by_settings(runs, lambda run: run[0], lambda run: int(run[2]["env_steps"]))
+    return [_summarise_group(group) for group in groups]
 
 
-def _summarise_group(name: str, env_steps: int, runs: list[tuple[Config, pathlib.Path, dict]]) -> dict:
-    config = runs[0][0]
+def _summarise_group(runs: list[tuple[Config, pathlib.Path, dict]]) -> dict:
+    config, _, last_row = runs[0]
     row = {
         "algorithm": name_algorithm(config),
         "encoding": config.encoding,
-        "name": name,
+        "name": config.name,
+        "runs": [folder.name for _, folder, _ in runs],
         "seeds": sorted(run.seed for run, _, _ in runs),
-        "env_steps": env_steps,
+        "env_steps": int(last_row["env_steps"]),
     }
     columns = {key: f"{key}_mean" for key in RETURNS} if config.task == "hopper" else {key: key for key in SUCCESSES}
     for key, column in columns.items():
         values = [float(last[column]) for _, _, last in runs if last.get(column)]
         row[f"{key}_mean"] = round(float(np.mean(values)), 1) if values else None
-        row[f"{key}_std"] = round(float(np.std(values)), 1) if values else None
+        deviation = deviation_over_seeds(values)
+        row[f"{key}_std"] = None if deviation is None else round(deviation, 1)
     seconds = [read_wall_seconds(folder) for _, folder, _ in runs]
     row["wall_seconds"] = round(float(np.mean(seconds)), 1)
     row["commit"] = sorted({read_run_commit(folder) for _, folder, _ in runs})
     return row
+
+
+def deviation_over_seeds(values: Sequence[float]) -> float | None:
+    """Sample standard deviation (of N - 1); None of fewer than two values."""
+    return float(np.std(values, ddof=1)) if len(values) > 1 else None
 
 
 def name_algorithm(config: Config) -> str:
@@ -72,7 +76,10 @@ def name_algorithm(config: Config) -> str:
 
 
 def read_wall_seconds(folder: pathlib.Path) -> float:
-    """Time from start to the last evaluation, summed over the processes that a resumed run had (each counts from 0)."""
+    """Time that training took, without what was lost between the newest checkpoint and a kill.
+
+    Seconds go on where a run is resumed; in files from before they did, each process counts from 0.
+    """
     seconds = [float(row["seconds"]) for row in read_rows(folder / TIMING_FILE)]
     return sum(now for now, after in zip(seconds, [*seconds[1:], 0.0], strict=True) if after < now)
 

@@ -1,6 +1,5 @@
 """The paper's table 1 beside ours: zero-shot success on the type left out, one row for each policy that was evaluated."""
 
-import collections
 import json
 import pathlib
 from collections.abc import Sequence
@@ -8,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hcp_jax.config import ArmConfig, ArmPoolConfig, Config
-from hcp_jax.evaluation.summary import name_algorithm, read_run_commit, read_wall_seconds
+from hcp_jax.evaluation.groups import group_by_settings
+from hcp_jax.evaluation.summary import deviation_over_seeds, name_algorithm, read_run_commit, read_wall_seconds
 from hcp_jax.training.run_folder import read_config
 
 # (task, hole moves, type left out): experiment of HCP-E (that of DDPG+HER is the next), mean and deviation of each [%].
@@ -24,7 +24,7 @@ PAPER = {
 }
 
 
-Runs = Sequence[tuple[str, dict, Config]]  # of one experiment: policy, record and config of each seed
+Runs = Sequence[tuple[str, dict, Config]]  # of one experiment: policy, record and config of each seed (`group_evaluations`)
 
 
 def make_table1(results: pathlib.Path) -> list[dict]:
@@ -46,16 +46,20 @@ def make_table1(results: pathlib.Path) -> list[dict]:
 
 
 def group_evaluations(results: pathlib.Path) -> list[Runs]:
-    """The evaluated runs of each experiment that leaves one type out and was evaluated on it."""
-    groups: dict[str, list[tuple[str, dict, Config]]] = collections.defaultdict(list)
+    """The evaluated runs of each experiment that leaves one type out and was evaluated on it.
+
+    Those together have equal settings (seed aside), equal control steps and equally many trials and robots in each.
+    """
+    runs: list[tuple[str, dict, Config]] = []
     for path in sorted((results / "arms" / "evaluations").glob("*.json")):
         folder = results / "arms" / "runs" / path.stem
         if folder.is_dir():  # of a whole run: others have another name
             record, config = json.loads(path.read_text()), read_config(folder)
             assert isinstance(config.pool, ArmPoolConfig)
             if len(config.pool.left_out) == 1 and config.pool.left_out[0] in record["types"]:
-                groups[config.name].append((path.stem, record, config))
-    return list(groups.values())
+                runs.append((path.stem, record, config))
+    measured = ("checkpoint_env_steps", "trials", "robots_per_trial")
+    return group_by_settings(runs, lambda run: run[2], lambda run: tuple(run[1][name] for name in measured))
 
 
 def left_out_type(config: Config) -> str:
@@ -76,7 +80,7 @@ def find_paper(config: Config, left_out: str) -> tuple[int | None, tuple[float, 
 
 def sort_rows(rows: Sequence[dict]) -> list[dict]:
     """By the paper's number, controls last."""
-    return sorted(rows, key=lambda row: (row["experiment"] or 99, row["task"], row["encoding"]))
+    return sorted(rows, key=lambda row: (row["experiment"] or 99, row["task"], row["encoding"], row["policy"]))
 
 
 def make_row(
@@ -86,7 +90,8 @@ def make_row(
 
     Returns:
         experiment, task, train_types, test_type, algorithm, encoding, network, seeds, success_mean,
-        success_std_over_trials (mean over seeds), success_std_over_seeds, reachable_success_mean, control_steps, wall_seconds,
+        success_std_over_trials (mean over seeds), success_std_over_seeds (of a sample, None of one seed),
+        reachable_success_mean, control_steps, wall_seconds,
         paper_mean and paper_std (of HCP-E for every v_h, of DDPG+HER for none, None for controls), policy (names), commit.
         Success in percent.
     """
@@ -94,7 +99,8 @@ def make_row(
     assert isinstance(config.pool, ArmPoolConfig)
     measured = [record["types"][test_type] for _, record, _ in runs]
     folders = [results / "arms" / "runs" / name for name, _, _ in runs]
-    means = np.asarray([row["success_mean"] for row in measured])
+    means = [row["success_mean"] for row in measured]
+    deviation = deviation_over_seeds(means)
     reachable = [row["reachable_success_mean"] for row in measured if row["reachable_success_mean"] is not None]
     return {
         "experiment": experiment,
@@ -105,9 +111,9 @@ def make_row(
         "encoding": config.encoding,
         "network": config.ddpg.network,
         "seeds": sorted(config.seed for _, _, config in runs),
-        "success_mean": round(float(means.mean()), 2),
+        "success_mean": round(float(np.mean(means)), 2),
         "success_std_over_trials": round(float(np.mean([row["success_std"] for row in measured])), 2),
-        "success_std_over_seeds": round(float(means.std()), 2) if len(runs) > 1 else None,
+        "success_std_over_seeds": None if deviation is None else round(deviation, 2),
         "reachable_success_mean": round(float(np.mean(reachable)), 2) if reachable else None,
         "control_steps": runs[0][1]["checkpoint_env_steps"],
         "wall_seconds": round(float(np.mean([read_wall_seconds(folder) for folder in folders])), 1),

@@ -5,11 +5,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from hcp_jax.config import Config
+from hcp_jax.evaluation.groups import label_groups
 from hcp_jax.evaluation.summary import SeedCurve, name_algorithm
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import Line, draw_curves
 from hcp_jax.reporting.published import Published, Run, average_runs
-from hcp_jax.reporting.settings import RESULTS_COMMANDS, SETTINGS, Setting, roman
+from hcp_jax.reporting.settings import LISTED, LISTED_COMMAND, RESULTS_COMMANDS, SETTINGS, Setting, roman
 from hcp_jax.reporting.tables import NOT_RUN
 from hcp_jax.training.metrics import METRICS_FILE
 
@@ -71,7 +72,7 @@ def make_leave_one_out(published: Published, setting: Setting) -> Item:
         figures=tuple(
             figure for column, caption in panels if (figure := draw_groups(published, groups, column, caption)) is not None
         ),
-        commands=(*train_commands(list(dict.fromkeys([*trained, *names]))), RESULTS_COMMANDS[1]),
+        commands=(*train_commands([*trained, *names]), RESULTS_COMMANDS[1]),
     )
 
 
@@ -133,11 +134,12 @@ def draw_groups(
 ) -> Figure | None:
     """A panel with a line for each group of seeds that has the column; None if none has."""
     lines, files = [], []
-    for runs in sorted(groups, key=lambda runs: runs[0].config.encoding.startswith("none")):  # baselines below
+    groups = sorted(groups, key=lambda runs: runs[0].config.encoding.startswith("none"))  # baselines below
+    labels = label_groups([name(runs[0].config) for runs in groups], [[run.folder.name for run in runs] for runs in groups])
+    for label_of_runs, runs in zip(labels, groups, strict=True):
         curve = average_runs(runs, column)
         if curve is not None:
-            config = runs[0].config
-            lines.append(Line(f"{name(config)} ({count_seeds(curve)})", config.encoding, curve))
+            lines.append(Line(f"{label_of_runs} ({count_seeds(curve)})", runs[0].config.encoding, curve))
             files += metrics_of(published, runs)
     return Figure(draw_curves(lines, label, limits), caption, tuple(files)) if lines else None
 
@@ -155,8 +157,9 @@ def metrics_of(published: Published, runs: Sequence[Run]) -> tuple[str, ...]:
 
 
 def train_commands(names: Sequence[str]) -> tuple[str, ...]:
-    """The commands that train experiments with seed 0."""
-    return tuple(f"python -m hcp_jax.train --config experiments/{name}.py --out runs/arms/{name}_s0" for name in names)
+    """The commands that train experiments with seed 0, each once."""
+    train = "python -m hcp_jax.train --config experiments/{name}.py --out runs/arms/{name}_s0"
+    return tuple(dict.fromkeys(LISTED_COMMAND if name in LISTED else train.format(name=name) for name in names))
 
 
 def describe_missing(published: Published, names: Sequence[str]) -> str:

@@ -1,10 +1,13 @@
 """The hopper: learning curves, new hoppers, and the learned embedding."""
 
+import pathlib
+
 import numpy as np
 
-from hcp_jax.config import Config
+from hcp_jax.evaluation.groups import label_groups
+from hcp_jax.evaluation.hopper_results import name_start
 from hcp_jax.evaluation.records import naming, number, optional_number, read_json
-from hcp_jax.evaluation.summary import RETURNS
+from hcp_jax.evaluation.summary import RETURNS, deviation_over_seeds
 from hcp_jax.reporting.curves import SPREAD, draw_groups
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import draw_embedding
@@ -33,14 +36,14 @@ def hopper_section(published: Published) -> Section:
 def make_performance(published: Published) -> Item:
     """A row for each algorithm, and its curves."""
     path, rows = published.find("hopper/summary.json"), []
-    for row in read_json(path, list) if path else ():
+    for row, name in name_rows(path) if path else ():
         with naming(path):
             returns = [show_return(row[f"{kind}_mean"], row[f"{kind}_std"]) for kind in RETURNS]
             steps, minutes = f"{number(row['env_steps']) / 1e6:.2f}", f"{number(row['wall_seconds']) / 60:.0f}"
             cells = (
                 str(row["algorithm"]),
                 str(row["encoding"]),
-                str(row["name"]),
+                name,
                 *returns,
                 str(len(row["seeds"])),
                 steps,
@@ -50,7 +53,7 @@ def make_performance(published: Published) -> Item:
     columns = ("algorithm", "v_h", "experiment", *KINDS.values(), "seeds", "control steps [M]", "minutes")
     tables = ()
     if rows:
-        caption = "Return at the end: mean and standard deviation over seeds"
+        caption = "Return at the end: mean and sample standard deviation over seeds"
         tables = (Table(caption, columns, "llcrrrrrr", tuple(rows), (published.show(path),)),)
     hoppers = [run.config for run in published.hoppers]
     names = [config.name for config in hoppers if config.pool.split != "new" and config.name != "hopper_embedding"]
@@ -62,6 +65,14 @@ def make_performance(published: Published) -> Item:
     return Item("Learning curves", "", tables, tuple(figure for figure in figures if figure), commands)
 
 
+def name_rows(path: pathlib.Path) -> list[tuple[dict, str]]:
+    """The rows of a summary, each with its experiment's name, and its runs where rows share the name."""
+    rows = read_json(path, list)
+    with naming(path):
+        labels = label_groups([str(row["name"]) for row in rows], [[str(name) for name in row["runs"]] for row in rows])
+        return list(zip(rows, labels, strict=True))
+
+
 def make_first_steps(published: Published) -> Item:
     """What HCP-I is worth on a hopper that it never saw, by how much the hopper has shown of itself."""
     folder = published.find("hopper/evaluations")
@@ -71,9 +82,10 @@ def make_first_steps(published: Published) -> Item:
             for name, outcome in read_json(path, dict)["sets"].items():
                 returns.setdefault(name_set(name), []).append(number(outcome["return_mean"]))
     rows = tuple(
-        Row((steps, show_return(np.mean(values), np.std(values)), str(len(values)))) for steps, values in returns.items()
+        Row((steps, show_return(np.mean(values), deviation_over_seeds(values)), str(len(values))))
+        for steps, values in returns.items()
     )
-    caption = "Return of one episode: mean and standard deviation over seeds"
+    caption = "Return of one episode: mean and sample standard deviation over seeds"
     columns = ("v_h from", "return", "seeds")
     tables = (Table(caption, columns, "lrr", rows, tuple(published.show(path) for path in paths)),) if rows else ()
     text = (
@@ -120,18 +132,14 @@ def make_new_hoppers(published: Published) -> Item:
     names = dict.fromkeys(run.config.name for run in published.hoppers if run.config.pool.split == "new")
     groups, caption = published.runs_of(list(names)), "The 100 new hoppers."
     figure = draw_groups(published, groups, "train_return_mean", caption, LABEL, None, name_start)
-    train, init = "python -m hcp_jax.train --config experiments", "--config.init=results/policies/hopper_hcpi_s0"
+    train = "python -m hcp_jax.train --config experiments"
     commands = (
         f"{train}/hopper_finetune_scratch.py --out runs/hopper/hopper_finetune_scratch_s0",
-        f"{train}/hopper_finetune_hidden.py --out runs/hopper/hopper_finetune_hidden_s0 {init}",
-        f"{train}/hopper_finetune.py --out runs/hopper/hopper_finetune_s0 {init}",
+        f"{train}/hopper_finetune_hidden.py --out runs/hopper/hopper_finetune_hidden_s0",
+        f"{train}/hopper_finetune.py --out runs/hopper/hopper_finetune_s0",
         COLLECT_COMMAND,
     )
     return Item("Transfer to 100 new hoppers", "", tables, (figure,) if figure else (), commands)
-
-
-def name_start(config: Config) -> str:
-    return f"pretrained, {config.init_layers} layers" if config.init else "from scratch"
 
 
 def make_embedding(published: Published) -> Item:
@@ -153,5 +161,7 @@ def make_embedding(published: Published) -> Item:
 
 
 def show_return(mean: object, deviation: object) -> str:
-    """`5405.8 ± 142.3`, or nothing for what an algorithm does not have."""
-    return "" if mean is None else f"{number(mean):.1f} \N{PLUS-MINUS SIGN} {number(deviation):.1f}"
+    """`5405.8 ± 142.3`, the mean alone of one seed, or nothing for what an algorithm does not have."""
+    if mean is None or deviation is None:
+        return "" if mean is None else f"{number(mean):.1f}"
+    return f"{number(mean):.1f} \N{PLUS-MINUS SIGN} {number(deviation):.1f}"

@@ -1,11 +1,11 @@
 """The folder of results that a report is made from: what is there, and what is missing."""
 
 import dataclasses
-import json
 import pathlib
 from collections.abc import Sequence
 
-from hcp_jax.config import Config, ConfigError, to_dict
+from hcp_jax.config import Config, ConfigError
+from hcp_jax.evaluation.groups import group_by_settings
 from hcp_jax.evaluation.records import TableRow, naming, read_learning_curve, read_table
 from hcp_jax.evaluation.summary import SeedCurve, average_curves
 from hcp_jax.training.metrics import METRICS_FILE
@@ -57,13 +57,8 @@ class Published:
     def runs_of(self, names: Sequence[str]) -> list[list[Run]]:
         """The runs of the experiments `names`, in that order. Those that differ in their seed alone, and in the run that they
         start from, are together."""
-        groups: dict[str, list[Run]] = {}
-        for name in names:
-            for run in (*self.arms, *self.hoppers):
-                if run.config.name == name:
-                    same = to_dict(run.config) | {"seed": None, "init": bool(run.config.init)}
-                    groups.setdefault(json.dumps(same), []).append(run)
-        return list(groups.values())
+        runs = [run for name in names for run in (*self.arms, *self.hoppers) if run.config.name == name]
+        return group_by_settings(runs, lambda run: run.config)
 
     def _runs(self, task: str) -> list[Run]:
         folder = self.find(f"{task}/runs")

@@ -13,7 +13,10 @@ RESULTS_COMMANDS = (
 EVALUATE_COMMAND = (
     "python -m hcp_jax.evaluate results/policies/{name} --without-robots --json results/arms/evaluations/{name}.json"
 )
-TABLES_COMMAND = "python -m hcp_jax.collect runs/arms --out results                         # writes the tables"
+TABLES_COMMAND = "python -m hcp_jax.collect --out results                                   # makes the tables anew"
+# Experiments without a file of their own, and the list that runs them.
+LISTED = tuple(f"{task}_{inputs}_leave_h" for task in ("reacher", "peg") for inputs in ("chain", "end_effector", "goal_offset"))
+LISTED_COMMAND = "python -m hcp_jax.sweep experiments/encodings.py --out runs/arms"
 
 
 @dataclasses.dataclass(frozen=True)

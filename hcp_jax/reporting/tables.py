@@ -9,6 +9,7 @@ from hcp_jax.reporting.page import Item, Row, Section, Table
 from hcp_jax.reporting.published import Published
 from hcp_jax.reporting.settings import (
     EVALUATE_COMMAND,
+    LISTED_COMMAND,
     RESULTS_COMMANDS,
     SETTINGS,
     TABLES_COMMAND,
@@ -83,7 +84,7 @@ def make_controls(published: Published, rows: Sequence[TableRow]) -> Item:
         "DDPG+HER that sees the end effector's position, or its offset from the goal, and no v_h: how much of the gain is the "
         "position rather than the hardware."
     )
-    commands = ("python -m hcp_jax.sweep experiments/encodings.py --out runs/arms", *COMMANDS[1:])
+    commands = (LISTED_COMMAND, *COMMANDS[1:])
     return Item("Controls, which the paper does not have", text, (table,) if lines else (), commands=commands)
 
 
@@ -121,9 +122,9 @@ def types_of_experiment(rows: Sequence[TableRow], setting: Setting, experiment: 
     paper = {letter: paper_by_type(experiment, setting.left_out, letter) for letter in PAPER_TYPES}
     shown = [spread(*of_type) if of_type else "left out" for of_type in paper.values()]
     lines = [Row((roman(experiment), algorithm, "", "paper", *shown), "paper")]
-    for inputs in dict.fromkeys(name_inputs(row) for row in measured):
-        ours = {row.test_type: row for row in measured if name_inputs(row) == inputs}
-        first = (roman(experiment), algorithm, inputs)
+    for policies in dict.fromkeys(row.policy for row in measured):
+        ours = {row.test_type: row for row in measured if row.policy == policies}
+        first = (roman(experiment), algorithm, name_inputs(next(iter(ours.values()))))
         cells, differences = [], []
         for letter in PAPER_TYPES:
             row = ours.get(letter)

@@ -175,22 +175,25 @@ class TrainingLoop:
             "skipped_updates": int(state.skipped.total),
         }
         metrics = {"env_steps": self._env_steps, **evaluated, **run.learner_metrics(state), **counts}
-        timing = {
-            "env_steps": self._env_steps,
-            "seconds": self._progress.elapsed,
-            "steps_per_second": self._progress.steps_per_second(self._env_steps),
-        }
         state = state.replace(sums=jax.tree.map(jnp.zeros_like, state.sums))
         is_best = False
         if self._metrics:
             best = max((float(row[run.best_metric]) for row in self._metrics.rows()), default=-math.inf)
             is_best = metrics[run.best_metric] >= best
             # The row first: a resumed run drops rows after its checkpoint, but could not make up for one that is missing.
-            self._metrics.write(metrics, timing)
+            self._metrics.write(metrics, self._timing(self._metrics.seconds_before))
         self._checkpoints.save(self._iteration, state, any_process(is_best))
         self._progress.say(f"{self._env_steps:>12,} steps  {line}")
         self._report_diverged(diverged)
         return state, metrics
+
+    def _timing(self, seconds_before: float) -> dict[str, float]:
+        """A row of `timing.csv`: seconds of all processes of the run, speed of this one."""
+        return {
+            "env_steps": self._env_steps,
+            "seconds": seconds_before + self._progress.elapsed,
+            "steps_per_second": self._progress.steps_per_second(self._env_steps),
+        }
 
     def _report_diverged(self, diverged: np.ndarray) -> None:
         if diverged.any():
@@ -202,6 +205,7 @@ class TrainingLoop:
         self._checkpoints.save(self._iteration, state)
         self._checkpoints.wait()
         if self._metrics:
+            self._metrics.write_timing(self._timing(self._metrics.seconds_before))
             self._metrics.close()
         self._progress.say(f"interrupted at {self._env_steps:,} steps; saved. Continue with --resume --out {self._folder}")
 

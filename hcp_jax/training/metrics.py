@@ -15,24 +15,37 @@ TIMING_FILE = "timing.csv"
 
 
 class MetricsWriter:
-    """Appends rows; on resume it first drops the rows after the checkpoint."""
+    """Appends rows; on resume it first drops the rows after the checkpoint.
+
+    Attributes:
+        seconds_before: training time [s] of the processes before this one, up to the last row that they left.
+    """
 
     def __init__(self, folder: pathlib.Path, resume_env_steps: int = 0):
         self._folder = folder
         for name in (METRICS_FILE, TIMING_FILE):
             rows = [row for row in read_rows(folder / name) if int(row["env_steps"]) <= resume_env_steps]
             _write_rows(folder / name, rows)
+        timing = read_rows(folder / TIMING_FILE)
+        self.seconds_before = float(timing[-1].get("seconds") or 0.0) if timing else 0.0
         self._events = tensorboardX.SummaryWriter(str(folder / "events"), purge_step=resume_env_steps + 1)
 
     def write(self, metrics: dict[str, Any], timing: dict[str, Any]) -> None:
         """Adds one evaluation. Both records start with `env_steps`."""
-        for name, record in ((METRICS_FILE, metrics), (TIMING_FILE, timing)):
-            row = {key: _format(value) for key, value in record.items()}
-            _write_rows(self._folder / name, [*read_rows(self._folder / name), row])
+        self._append(METRICS_FILE, metrics)
+        self.write_timing(timing)
         for key, value in (metrics | timing).items():
             if key != "env_steps" and value is not None:
                 self._events.add_scalar(key, value, metrics["env_steps"])
         self._events.flush()
+
+    def write_timing(self, timing: dict[str, Any]) -> None:
+        """Adds a row to `timing.csv` alone, for a run that stops between two evaluations."""
+        self._append(TIMING_FILE, timing)
+
+    def _append(self, name: str, record: dict[str, Any]) -> None:
+        row = {key: _format(value) for key, value in record.items()}
+        _write_rows(self._folder / name, [*read_rows(self._folder / name), row])
 
     def rows(self) -> list[dict[str, str]]:
         """The evaluations so far."""

@@ -53,6 +53,34 @@ def test_table_1_has_a_row_beside_the_papers_for_what_was_evaluated(results):
     assert by_type["A"]["success_mean"] == round(measured["success_mean"], 2)
 
 
+def test_table_1_averages_evaluations_of_equal_settings_and_steps_alone(results, tmp_path):
+    folder = tmp_path / "results"
+    shutil.copytree(results, folder)
+    run, evaluations = folder / "arms" / "runs", folder / "arms" / "evaluations"
+    config = json.loads((run / "arms_s0" / "config.json").read_text())
+    record = json.loads((evaluations / "arms_s0.json").read_text())
+    record["types"]["H"]["success_mean"] = 10.0
+    (evaluations / "arms_s0.json").write_text(json.dumps(record))
+    others = {
+        "arms_s1": ({"seed": 1}, {}),
+        "arms_s2": ({"seed": 2}, {"checkpoint_env_steps": 160}),
+        "wide_s0": ({"num_envs": 8}, {}),
+    }
+    for name, (change, measured) in others.items():
+        shutil.copytree(run / "arms_s0", run / name)
+        (run / name / "config.json").write_text(json.dumps(config | change))
+        record["types"]["H"]["success_mean"] = 20.0
+        (evaluations / f"{name}.json").write_text(json.dumps(record | measured))
+    rows = {tuple(row["policy"]): row for row in make_table1(folder)}
+    assert {policies: row["control_steps"] for policies, row in rows.items()} == {
+        ("arms_s0", "arms_s1"): 320,
+        ("arms_s2",): 160,
+        ("wide_s0",): 320,
+    }
+    both = rows["arms_s0", "arms_s1"]
+    assert (both["success_mean"], both["success_std_over_seeds"]) == (15.0, 7.07), "the deviation is a sample's"
+
+
 def test_a_run_that_is_collected_later_is_added_to_those_before(results, finished_arms, tmp_path):
     shutil.copytree(finished_arms, tmp_path / "runs" / "arms_s1")
     config = json.loads((finished_arms / "config.json").read_text()) | {"seed": 1}

@@ -6,9 +6,10 @@ import pytest
 
 from hcp_jax import collect, sweep
 from hcp_jax.config import to_dict
+from hcp_jax.evaluation.groups import group_folders
 from hcp_jax.evaluation.hopper_results import write_finetune
 from hcp_jax.evaluation.hopper_sweeps import evaluate_hoppers
-from hcp_jax.evaluation.summary import read_curve, read_wall_seconds, steps_to_reach
+from hcp_jax.evaluation.summary import read_curve, read_wall_seconds, steps_to_reach, summarise_runs
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import CheckpointError
 from hcp_jax.training.metrics import MetricsWriter
@@ -96,12 +97,65 @@ def test_steps_to_reach_is_the_first_evaluation_at_or_above_the_value(tmp_path):
     assert steps_to_reach(tmp_path, "r", 7.0) is None
 
 
-def test_wall_time_adds_up_the_processes_of_a_resumed_run(tmp_path):
-    writer = MetricsWriter(tmp_path)
-    for steps, seconds in ((10, 5.0), (20, 9.0), (30, 2.0), (40, 4.5)):
+def write_timings(writer: MetricsWriter, *rows: tuple[int, float]) -> None:
+    for steps, seconds in rows:
         writer.write({"env_steps": steps}, {"env_steps": steps, "seconds": seconds})
     writer.close()
+
+
+def test_wall_time_of_old_files_adds_up_processes_that_each_count_from_zero(tmp_path):
+    write_timings(MetricsWriter(tmp_path), (10, 5.0), (20, 9.0), (30, 2.0), (40, 4.5))
     assert read_wall_seconds(tmp_path) == 9.0 + 4.5
+    resumed = MetricsWriter(tmp_path, resume_env_steps=40)
+    write_timings(resumed, (50, resumed.seconds_before + 6.0))
+    assert read_wall_seconds(tmp_path) == 9.0 + 4.5 + 6.0
+
+
+def test_wall_time_counts_a_process_whose_first_evaluation_comes_later_than_all_before(tmp_path):
+    write_timings(MetricsWriter(tmp_path), (10, 5.0), (20, 9.0))
+    resumed = MetricsWriter(tmp_path, resume_env_steps=10)
+    assert resumed.seconds_before == 5.0, "the row at 20 was lost"
+    write_timings(resumed, (20, resumed.seconds_before + 700.0))
+    assert read_wall_seconds(tmp_path) == 705.0
+
+
+def test_runs_of_one_name_with_other_settings_have_rows_and_curves_of_their_own(tiny_config, tmp_path):
+    for name, changes in {"a_s0": {}, "a_s1": {"seed": 1}, "wide_s0": {"num_envs": 2 * tiny_config.num_envs}}.items():
+        run_folder.write_start(tmp_path / name, dataclasses.replace(tiny_config, **changes), "native")
+        value = 40.0 if name == "wide_s0" else 10.0 + 2.0 * changes.get("seed", 0)
+        writer = MetricsWriter(tmp_path / name)
+        writer.write({"env_steps": 64, "train_return_mean": value}, {"env_steps": 64, "seconds": 1.0})
+        writer.close()
+    folders = sorted(tmp_path.iterdir())
+    rows = summarise_runs(folders)
+    assert [(row["runs"], row["train_return_mean"], row["train_return_std"]) for row in rows] == [
+        (["a_s0", "a_s1"], 11.0, 1.4),
+        (["wide_s0"], 40.0, None),
+    ]
+    assert list(group_folders(folders)) == [f"{tiny_config.name} (a_s0, a_s1)", f"{tiny_config.name} (wide_s0)"]
+
+
+def test_tables_are_made_anew_from_the_results_alone(swept, collected, tmp_path, capsys):
+    shutil.copytree(swept / "results", tmp_path / "results")
+    summary = tmp_path / "results" / "hopper" / "summary.json"
+    before = summary.read_bytes()
+    summary.unlink()
+    collect.main(["--out", str(tmp_path / "results")])
+    assert summary.read_bytes() == before
+    with pytest.raises(SystemExit) as exit_info:
+        collect.main(["--out", str(tmp_path / "empty")])
+    assert exit_info.value.code == 2
+    assert "holds no published runs" in capsys.readouterr().err
+
+
+def test_a_run_whose_policy_cannot_be_read_leaves_the_results_as_they_were(swept, tmp_path, capsys):
+    shutil.copytree(swept / "runs", tmp_path / "runs")
+    shutil.rmtree(tmp_path / "runs" / "without_s1" / "checkpoints")
+    with pytest.raises(SystemExit) as exit_info:
+        collect.main([str(tmp_path / "runs"), "--out", str(tmp_path / "results")])
+    assert exit_info.value.code == 2
+    assert "without_s1: holds no checkpoint" in capsys.readouterr().err
+    assert not (tmp_path / "results").exists()
 
 
 def test_fine_tuning_reports_when_each_warm_start_reaches_what_scratch_ends_with(tiny_config, tmp_path):

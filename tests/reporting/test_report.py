@@ -20,9 +20,10 @@ from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.table1 import PAPER
 from hcp_jax.hardware.arm import arm_spec
 from hcp_jax.hardware.start_poses import start_angles
+from hcp_jax.reporting.curves import train_commands
 from hcp_jax.reporting.published import Published
 from hcp_jax.reporting.robots import arm_pose
-from hcp_jax.reporting.settings import SETTINGS, roman
+from hcp_jax.reporting.settings import LISTED, LISTED_COMMAND, SETTINGS, roman
 from hcp_jax.reporting.tables import letters
 from hcp_jax.training import run_folder
 from hcp_jax.training.metrics import MetricsWriter
@@ -118,6 +119,20 @@ def test_table_1_shows_every_row_of_its_file_beside_the_papers(committed):
             assert shown["paper [%]"] == spread(row["paper_mean"], row["paper_std"])
             points = float(shown["difference"].replace("\N{MINUS SIGN}", "-"))
             assert points == pytest.approx(row["success_mean"] - row["paper_mean"], abs=0.006)
+
+
+def test_every_experiment_that_the_page_names_is_a_file(tmp_path):
+    text = build(ROOT / "results", tmp_path / "report.html")
+    names = set(re.findall(r"experiments/\w+\.py", text))
+    assert len(names) > 20
+    assert not [name for name in names if not (ROOT / name).is_file()]
+
+
+def test_what_a_list_runs_has_no_file_of_its_own():
+    configs = runpy.run_path(str(ROOT / "experiments" / "encodings.py"))["get_configs"]()
+    without = {config.name for config in configs if not (ROOT / "experiments" / f"{config.name}.py").exists()}
+    assert set(LISTED) == without
+    assert train_commands(["reacher_chain_leave_h", "peg_goal_offset_leave_h"]) == (LISTED_COMMAND,)
 
 
 def test_every_experiment_of_table_1_is_there_with_the_papers_figure(committed):
@@ -239,9 +254,9 @@ def test_the_stress_test_stands_beside_the_papers(tiny):
 
 
 def test_what_first_steps_tell_is_averaged_over_seeds(tiny):
-    rows = tiny.rows("hopper", "Return of one episode: mean and standard deviation over seeds")
+    rows = tiny.rows("hopper", "Return of one episode: mean and sample standard deviation over seeds")
     shown = {row["v_h from"]: (row["return"], row["seeds"]) for row in rows}
-    assert shown["50 control steps of its own"] == ("50.0 \N{PLUS-MINUS SIGN} 10.0", "2")
+    assert shown["50 control steps of its own"] == ("50.0 \N{PLUS-MINUS SIGN} 14.1", "2")
     assert shown["nothing: the mean"] == ("10.0 \N{PLUS-MINUS SIGN} 0.0", "2")
 
 
