@@ -49,6 +49,17 @@ def on_files(files, config):
     return files
 
 
+def on_page_markdown(markdown, **_):
+    """mkdocs asks here for the text of each page."""
+    return point_into_site(markdown)
+
+
+def point_into_site(text: str) -> str:
+    """A page's text whose links, which hold in a checkout, lead to the site's own pages and to the results beside them."""
+    text = text.replace("](../README.md", "](index.md").replace("](../results/", "](results/")
+    return re.sub(r"\]\(\.\./hcp_jax/(\w+)\)", r"](api/\1.md)", text.replace("](../hcp_jax/config)", "](configuration.md)"))
+
+
 def home_page() -> str:
     """README.md, whose links start at the repository's root."""
     return (ROOT / "README.md").read_text().replace("](docs/", "](")

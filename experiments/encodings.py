@@ -1,5 +1,5 @@
-"""Exp. I and V with every other v_h, at equal steps: the paper's constant, none (Exp. II and VI), and what the end effector
-alone explains.
+"""Exp. I and V with four other v_h, at equal steps: the paper's constant, none (Exp. II and VI), and what the end effector
+alone explains: its position, and its offset from the goal.
 
 `python -m hcp_jax.sweep experiments/encodings.py`
 """

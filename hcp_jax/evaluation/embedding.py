@@ -13,7 +13,7 @@ def knn_r2(embedding: np.ndarray, target: np.ndarray, neighbours: int = 5, folds
     predicted = np.empty(len(target))
     for k in range(folds):
         tree = cKDTree(embedding[fold != k])
-        _, rows = tree.query(embedding[fold == k], k=neighbours)
+        _, rows = tree.query(embedding[fold == k], k=range(1, neighbours + 1))
         predicted[fold == k] = target[fold != k][rows].mean(axis=1)
     return float(1.0 - np.mean((target - predicted) ** 2) / np.var(target))
 

@@ -45,7 +45,7 @@ def make_table1(results: pathlib.Path) -> list[dict]:
     return sort_rows(rows)
 
 
-def group_evaluations(results: pathlib.Path) -> list[Runs]:
+def group_evaluations(results: pathlib.Path) -> Sequence[Runs]:
     """The evaluated runs of each experiment that leaves one type out and was evaluated on it.
 
     Those together have equal settings (seed aside), equal control steps and equally many trials and robots in each.

@@ -16,6 +16,7 @@ from hcp_jax.config import Config, DDPGConfig, field_names
 from hcp_jax.presets import FAST_DDPG, arm, hopper
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
 @pytest.fixture(scope="module")
@@ -89,9 +90,31 @@ def test_a_field_without_text_is_seen(pages):
 
 def test_every_field_that_a_page_sets_exists():
     known = {*field_names(hopper("a", "none")), *field_names(arm("a", "reacher", "none"))}
-    for page in (ROOT / "docs").glob("*.md"):
+    for page in PAGES:
         for name in re.findall(r"--config\.([\w.]+)=", page.read_text()):
-            assert name in known, f"{page.name}: --config.{name}"
+            assert name in known or name == "FIELD", f"{page.name}: --config.{name}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_link_of_a_page_leads_somewhere_in_a_checkout(page):
+    headings = {path: set(map(anchor, re.findall(r"^#+ (.*)", path.read_text(), re.MULTILINE))) for path in PAGES}
+    for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+        if not link.startswith("http"):
+            path, _, heading = link.partition("#")
+            target = (page.parent / path).resolve() if path else page
+            assert target.exists(), link
+            assert not heading or heading in headings[target], link
+
+
+def anchor(heading: str) -> str:
+    """What a heading is called in links, on GitHub and on the site."""
+    return re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
+
+
+def test_links_of_a_checkout_lead_to_the_sites_own_pages(pages):
+    text = "[a](../README.md#b) [c](../results/d.json) [e](../hcp_jax/config) [f](../hcp_jax/policies) [g](h.md)"
+    expected = "[a](index.md#b) [c](results/d.json) [e](configuration.md) [f](api/policies.md) [g](h.md)"
+    assert pages.point_into_site(text) == expected
 
 
 class Parsed(Exception):
@@ -101,7 +124,7 @@ class Parsed(Exception):
 def commands_in_pages() -> list[tuple[str, str, str]]:
     """(page, module, arguments) of every command of ours, in blocks and in running text."""
     found = []
-    for page in sorted((ROOT / "docs").glob("*.md")):
+    for page in PAGES:
         text = page.read_text().replace("\\\n", " ")
         found += [(page.name, *match) for match in re.findall(r"python -m (hcp_jax\.\w+)([^`#\n]*)", text)]
     return found

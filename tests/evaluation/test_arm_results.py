@@ -64,7 +64,7 @@ def test_table_1_averages_evaluations_of_equal_settings_and_steps_alone(results,
     others = {
         "arms_s1": ({"seed": 1}, {}),
         "arms_s2": ({"seed": 2}, {"checkpoint_env_steps": 160}),
-        "wide_s0": ({"num_envs": 8}, {}),
+        "wide_s0": ({"num_envs": 2 * config["num_envs"]}, {}),
     }
     for name, (change, measured) in others.items():
         shutil.copytree(run / "arms_s0", run / name)

@@ -12,9 +12,11 @@ import pytest
 
 from hcp_jax.algorithms.ppo import get_actor
 from hcp_jax.config import to_dict
+from hcp_jax.evaluation.summary import read_wall_seconds
 from hcp_jax.training import loop
 from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
 from hcp_jax.training.loop import Interrupt, TrainingLoop
+from hcp_jax.training.metrics import read_rows
 from hcp_jax.training.policy_file import load_policy
 from hcp_jax.training.warm_start import load_init
 
@@ -66,8 +68,13 @@ def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished_ru
 
     run.ppo.train = train_and_interrupt
     assert training.run(run.init_state(), interrupt) is None
+    stopped = read_rows(folder / "timing.csv")
+    assert int(stopped[-1]["env_steps"]) == cut * tiny_config.batch_size
     loop.train(tiny_config, folder, resume=True)
     assert (folder / "metrics.csv").read_bytes() == (finished_run / "metrics.csv").read_bytes()
+    seconds = [float(row["seconds"]) for row in read_rows(folder / "timing.csv")]
+    assert seconds == sorted(seconds), "the clock goes on where it stopped"
+    assert read_wall_seconds(folder) == seconds[-1]
 
 
 def test_rows_written_after_the_last_checkpoint_are_dropped_on_resume(finished_run, tiny_config, tmp_path):
