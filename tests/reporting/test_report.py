@@ -358,7 +358,7 @@ def test_a_file_that_is_no_report_is_kept(results, tmp_path, capsys):
     (tmp_path / "thesis.html").write_text("<!DOCTYPE html><p>mine")
     assert "thesis.html: exists and is no report" in fails(capsys, results, tmp_path / "thesis.html")
     assert (tmp_path / "thesis.html").read_text() == "<!DOCTYPE html><p>mine"
-    assert "exists and is no report" in fails(capsys, results, tmp_path)
+    assert "Is a directory" in fails(capsys, results, tmp_path)
 
 
 def test_fine_tuning_is_compared_by_steps(tiny):
