@@ -3,7 +3,7 @@
 import dataclasses
 
 from hcp_jax import presets
-from hcp_jax.config import Config, PoolConfig
+from hcp_jax.config import Config, HopperPoolConfig
 from hcp_jax.hardware.ranges import torso_mass_only
 
 
@@ -13,6 +13,6 @@ def get_config() -> Config:
         encoding="embedding",
         total_env_steps=5_000_000,
         eval_every=1_000_000,
-        pool=PoolConfig(ranges=torso_mass_only()),
+        pool=HopperPoolConfig(ranges=torso_mass_only()),
         embedding=dataclasses.replace(presets.IDENTIFIED_EMBEDDING, size=2, fit_steps=0),
     )

@@ -2,7 +2,16 @@
 
 import dataclasses
 
-from hcp_jax.config import ArmConfig, ArmPoolConfig, Config, DDPGConfig, EmbeddingConfig, HopperConfig, PoolConfig, PPOConfig
+from hcp_jax.config import (
+    ArmConfig,
+    ArmPoolConfig,
+    Config,
+    DDPGConfig,
+    EmbeddingConfig,
+    HopperConfig,
+    HopperPoolConfig,
+    PPOConfig,
+)
 from hcp_jax.hardware.ranges import ArmRanges, nominal_lengths
 
 # Many environments, short unrolls: one environment per robot, 32 steps each. Rewards are scaled so that value targets are
@@ -46,7 +55,7 @@ def hopper_finetune(name: str, learning_rate: float, identify_steps: int, **chan
         eval_every=320_000,
         num_envs=1000,
         ppo=dataclasses.replace(FAST_PPO, learning_rate=learning_rate),
-        pool=PoolConfig(num_robots=100, split="new"),
+        pool=HopperPoolConfig(num_robots=100, split="new"),
         embedding=dataclasses.replace(IDENTIFIED_EMBEDDING, identify_steps=identify_steps, fit_steps=0),
     )
     return dataclasses.replace(config, **changes)

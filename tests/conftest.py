@@ -18,7 +18,7 @@ from hcp_jax.config import (
     DDPGConfig,
     EmbeddingConfig,
     HopperConfig,
-    PoolConfig,
+    HopperPoolConfig,
     PPOConfig,
 )
 from hcp_jax.hardware.hopper import make_hopper_pool
@@ -53,7 +53,7 @@ def tiny_config() -> Config:
         total_env_steps=512,
         eval_every=128,
         eval_robots=4,
-        pool=PoolConfig(num_robots=8, num_heldout=4),
+        pool=HopperPoolConfig(num_robots=8, num_heldout=4),
         env=HopperConfig(episode_length=24, integrator="euler"),
         ppo=PPOConfig(unroll_length=8, num_minibatches=2, num_epochs=2, hidden_sizes=(8, 8), normalize_observation=True),
         embedding=EmbeddingConfig(size=3, identify_steps=192, fit_steps=16),

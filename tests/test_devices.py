@@ -17,13 +17,13 @@ SCRIPT = """
 import json, sys
 import jax, jax.numpy as jnp, numpy as np
 from hcp_jax import presets
-from hcp_jax.config import ArmConfig, ArmPoolConfig, DDPGConfig, EmbeddingConfig, HopperConfig, PoolConfig, PPOConfig
+from hcp_jax.config import ArmConfig, ArmPoolConfig, DDPGConfig, EmbeddingConfig, HopperConfig, HopperPoolConfig, PPOConfig
 from hcp_jax.devices import get_mesh
 from hcp_jax.experiment.build import make_experiment
 
 HOPPER = presets.hopper(
     "a", "embedding", num_envs=8, total_env_steps=512,
-    pool=PoolConfig(num_robots=8, num_heldout=4), env=HopperConfig(episode_length=24, integrator="euler"),
+    pool=HopperPoolConfig(num_robots=8, num_heldout=4), env=HopperConfig(episode_length=24, integrator="euler"),
     ppo=PPOConfig(unroll_length=8, num_minibatches=2, num_epochs=2, hidden_sizes=(8, 8), normalize_observation=True),
     embedding=EmbeddingConfig(size=3, identify_steps=0, fit_steps=0),
 )

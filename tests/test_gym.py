@@ -5,11 +5,14 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from hcp_jax import gym, presets
-from hcp_jax.config import ArmPoolConfig, ConfigError, HopperConfig, PoolConfig
+from hcp_jax.config import ArmPoolConfig, ConfigError, HopperConfig, HopperPoolConfig
 
 NUM_ENVS = 6
 HOPPER = presets.hopper(
-    "a", "kinematics", pool=PoolConfig(num_robots=4, num_heldout=3), env=HopperConfig(episode_length=5, integrator="euler")
+    "a",
+    "kinematics",
+    pool=HopperPoolConfig(num_robots=4, num_heldout=3),
+    env=HopperConfig(episode_length=5, integrator="euler"),
 )
 REACHER = presets.arm("a", "reacher", "chain_fk", num_envs=NUM_ENVS, pool=ArmPoolConfig(("A", "I"), ("H",), 2, 2))
 CONFIGS = {"hopper": HOPPER, "reacher": REACHER}

@@ -5,7 +5,7 @@ from hcp_jax.config.checks import ConfigError
 from hcp_jax.config.conversion import field_names, from_dict, to_dict, unknown_field
 from hcp_jax.config.ddpg import DDPGConfig
 from hcp_jax.config.embedding import EmbeddingConfig
-from hcp_jax.config.hopper import HopperConfig, PoolConfig
+from hcp_jax.config.hopper import HopperConfig, HopperPoolConfig
 from hcp_jax.config.ppo import PPOConfig
 from hcp_jax.config.run import Config
 
@@ -17,8 +17,8 @@ __all__ = [
     "DDPGConfig",
     "EmbeddingConfig",
     "HopperConfig",
+    "HopperPoolConfig",
     "PPOConfig",
-    "PoolConfig",
     "field_names",
     "from_dict",
     "to_dict",

@@ -8,7 +8,7 @@ from hcp_jax.physics.base import INTEGRATORS
 
 
 @dataclasses.dataclass(frozen=True)
-class PoolConfig:
+class HopperPoolConfig:
     """The robots. A pool depends on this record alone, never on the training seed.
 
     Attributes:

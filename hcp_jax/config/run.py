@@ -6,7 +6,7 @@ from hcp_jax.config.arm import ARM_CONDITIONINGS, OWN_ARM_CONDITIONINGS, ArmConf
 from hcp_jax.config.checks import ConfigError, require
 from hcp_jax.config.ddpg import DDPGConfig
 from hcp_jax.config.embedding import EmbeddingConfig
-from hcp_jax.config.hopper import HopperConfig, PoolConfig
+from hcp_jax.config.hopper import HopperConfig, HopperPoolConfig
 from hcp_jax.config.ppo import PPOConfig
 from hcp_jax.hardware.arm import CHAIN_TYPES, OTHER_ARMS
 from hcp_jax.hardware.encodings import ENCODINGS
@@ -59,7 +59,7 @@ class Config:
     robot: str = ""
     robot_base: str = ""
     robot_tip: str = ""
-    pool: PoolConfig | ArmPoolConfig = PoolConfig()
+    pool: HopperPoolConfig | ArmPoolConfig = HopperPoolConfig()
     env: HopperConfig | ArmConfig = HopperConfig()
     ppo: PPOConfig = PPOConfig()
     ddpg: DDPGConfig = DDPGConfig()
@@ -91,7 +91,7 @@ class Config:
             require(getattr(self, field) >= 0, field, getattr(self, field), "at least 0")
 
     def _check_parts(self) -> None:
-        kinds = (PoolConfig, HopperConfig) if self.task == "hopper" else (ArmPoolConfig, ArmConfig)
+        kinds = (HopperPoolConfig, HopperConfig) if self.task == "hopper" else (ArmPoolConfig, ArmConfig)
         for field, kind in zip(("pool", "env"), kinds, strict=True):
             require(isinstance(getattr(self, field), kind), field, getattr(self, field), f"{kind.__name__} for {self.task}")
         require(not self.robot or self.task != "hopper", "robot", self.robot, "none for the hopper")

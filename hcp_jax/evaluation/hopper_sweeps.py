@@ -7,7 +7,7 @@ import jax
 import numpy as np
 
 from hcp_jax.algorithms.ppo import PPOState
-from hcp_jax.config import PoolConfig
+from hcp_jax.config import HopperPoolConfig
 from hcp_jax.envs.episodes import Episodes
 from hcp_jax.evaluation.first_steps import regress_v_h
 from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, load_pool
@@ -94,7 +94,7 @@ def choose_sets(
     """The record's sets of robots: a pool, rows [count] of it, and their v_h [count, K]. Arguments as of `evaluate_hoppers`."""
     config = run.config
     drawn = change_ranges(config, ranges).pool
-    assert isinstance(drawn, PoolConfig)
+    assert isinstance(drawn, HopperPoolConfig)
     heldout = load_pool(pool_folder, run.train_pool) if pool_folder else make_heldout_pool(drawn, count)
     index, new = (np.arange(count) % pool.num_robots for pool in (run.train_pool, heldout))
     sets = {"train": (run.train_pool, index, train_v_h(run, state.params)[index])}

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from hcp_jax.config import Config, ConfigError, PoolConfig
+from hcp_jax.config import Config, ConfigError, HopperPoolConfig
 from hcp_jax.experiment.arm import ArmExperiment, make_heldout_arms
 from hcp_jax.experiment.hopper import HopperExperiment, make_heldout_pool
 from hcp_jax.hardware import arm, hopper
@@ -105,7 +105,7 @@ def _first_robots(run: ArmExperiment | HopperExperiment, kind: str, count: int) 
     """At least the first `count` robots of a kind."""
     if kind == TRAINED:
         return run.train_pool
-    if isinstance(run.config.pool, PoolConfig):
+    if isinstance(run.config.pool, HopperPoolConfig):
         return make_heldout_pool(run.config.pool, count)
     return make_heldout_arms(run.config, (kind,), count)
 

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hcp_jax.algorithms.ppo import PPO, Params, PPOState, get_actor, put_actor
-from hcp_jax.config import Config, HopperConfig, PoolConfig
+from hcp_jax.config import Config, HopperConfig, HopperPoolConfig
 from hcp_jax.devices import copy_tree, replicate
 from hcp_jax.envs.base import PoolEnv
 from hcp_jax.envs.episodes import Episodes, Evaluator
@@ -99,7 +99,7 @@ def make_hopper_experiment(config: Config, physics: str) -> HopperExperiment:
         physics: the engine, may be `native-INTEGRATOR`.
     """
     pool_config = config.pool
-    assert isinstance(pool_config, PoolConfig)
+    assert isinstance(pool_config, HopperPoolConfig)
     assert isinstance(config.env, HopperConfig)
     train_pool = make_hopper_pool(pool_config.ranges, pool_config.num_robots, pool_config.seed, pool_config.split)
     heldout_pool = make_heldout_pool(pool_config, pool_config.num_heldout)
@@ -138,7 +138,7 @@ def make_evaluator(ppo: PPO, env: PoolEnv) -> Evaluator:
     return Evaluator(env, policy)
 
 
-def make_heldout_pool(pool_config: PoolConfig, num_robots: int) -> RobotPool:
+def make_heldout_pool(pool_config: HopperPoolConfig, num_robots: int) -> RobotPool:
     """Held-out robots 0..num_robots-1: no training pool of this seed contains them."""
     return make_hopper_pool(pool_config.ranges, num_robots, pool_config.seed, "heldout")
 

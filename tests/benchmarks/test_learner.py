@@ -13,7 +13,7 @@ from hcp_jax import benchmark
             ["--config.ddpg.updates_per_iteration=20", "--config.env.episode_length=10", "--config.ddpg.buffer_episodes=8"],
         ),
         pytest.param(
-            "presets.hopper('a', 'kinematics', num_envs=8, pool=PoolConfig(num_robots=4))",
+            "presets.hopper('a', 'kinematics', num_envs=8, pool=HopperPoolConfig(num_robots=4))",
             ["--config.ppo.unroll_length=8", "--config.ppo.num_minibatches=4"],
             marks=pytest.mark.slow,
         ),
@@ -21,7 +21,7 @@ from hcp_jax import benchmark
 )
 def test_an_iteration_and_its_parts_are_timed(experiment, sizes, tmp_path):
     (tmp_path / "experiment.py").write_text(
-        "from hcp_jax import presets\nfrom hcp_jax.config import ArmPoolConfig, PoolConfig\n"
+        "from hcp_jax import presets\nfrom hcp_jax.config import ArmPoolConfig, HopperPoolConfig\n"
         f"def get_config():\n    return {experiment}\n"
     )
     arguments = ["--config", str(tmp_path / "experiment.py"), "--seconds", "0.01", "--json", str(tmp_path / "out.json")]

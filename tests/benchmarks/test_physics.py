@@ -11,10 +11,10 @@ ROWS = ["mj_step", "mujoco.batch", "mujoco.batch.expand", "native", "rollout"]
 @pytest.mark.parametrize("task", ["hopper", "reacher"])
 def test_every_row_is_timed_with_every_batch(task, tmp_path):
     experiment = tmp_path / "experiment.py"
-    size = "pool=PoolConfig(num_robots=4)" if task == "hopper" else "left_out='H', pool=ArmPoolConfig(('I',), (), 2)"
+    size = "pool=HopperPoolConfig(num_robots=4)" if task == "hopper" else "left_out='H', pool=ArmPoolConfig(('I',), (), 2)"
     make = "hopper('a', 'kinematics'" if task == "hopper" else "arm('a', 'reacher', 'chain_fk'"
     experiment.write_text(
-        "from hcp_jax import presets\nfrom hcp_jax.config import ArmPoolConfig, PoolConfig\n"
+        "from hcp_jax import presets\nfrom hcp_jax.config import ArmPoolConfig, HopperPoolConfig\n"
         f"def get_config():\n    return presets.{make}, {size})\n"
     )
     out = tmp_path / "physics.json"

@@ -4,13 +4,13 @@ import pytest
 
 from hcp_jax import benchmark, presets
 from hcp_jax.benchmarks.training import benchmark_training, samples_per_step, time_to_success
-from hcp_jax.config import ArmConfig, ArmPoolConfig, DDPGConfig, HopperConfig, PoolConfig, PPOConfig
+from hcp_jax.config import ArmConfig, ArmPoolConfig, DDPGConfig, HopperConfig, HopperPoolConfig, PPOConfig
 
 HOPPER = presets.hopper(
     "a",
     "kinematics",
     num_envs=8,
-    pool=PoolConfig(num_robots=4, num_heldout=2),
+    pool=HopperPoolConfig(num_robots=4, num_heldout=2),
     env=HopperConfig(episode_length=20, integrator="euler"),
     ppo=PPOConfig(unroll_length=8, num_minibatches=4, num_epochs=3, hidden_sizes=(8, 8)),
 )
