@@ -1,4 +1,4 @@
-"""Exp. I with the constant v_h of the paper's text (`chain`), three times as long and in small batches; not run to its end. Preset: fast."""
+"""Exp. I with the constant v_h of the paper's text (`chain`), three times as long and in small batches. Preset: fast."""
 
 import dataclasses
 
