@@ -193,10 +193,6 @@ def test_a_record_that_could_not_be_written_is_refused_before_the_work(finished_
     assert (tmp_path / "file").read_text() == ""
 
 
-def test_a_published_policy_has_no_best_checkpoint(capsys):
-    assert "is a published policy, which is one alone" in fails(capsys, evaluate.main, [str(POLICY), "--best"])
-
-
 def test_a_sweep_refuses_no_seeds_and_a_folder_of_another_setting(finished_run, tiny_config, tmp_path, capsys):
     path = pathlib.Path(tiny_experiment(tmp_path, tiny_config))
     path.write_text(path.read_text() + "def get_configs():\n    return [get_config()]\n")

@@ -163,7 +163,7 @@ def test_three_hundred_damaged_files_are_read_or_refused_in_one_line(part, tmp_p
         assert "\n" not in (message or "")
         assert "without an answer" not in (message or ""), f"{path}: MuJoCo crashed"
         assert "not read within" not in (message or "")
-    assert min(outcomes.values()) > 2, outcomes
+    assert min(outcomes.values()) > 1, outcomes
 
 
 def try_to_read(path) -> str | None:

@@ -115,6 +115,12 @@ def test_a_damaged_best_checkpoint_is_said_in_one_line(finished_run, tiny_config
         load_policy(folder, loop.make_experiment(tiny_config), best=True)
 
 
+def test_a_published_policy_has_no_best_checkpoint(tiny_arms):
+    policy = pathlib.Path(__file__).resolve().parents[2] / "results" / "policies" / "reacher_hcpe_leave_h_s0"
+    with pytest.raises(CheckpointError, match="is a published policy, which is one alone"):
+        load_policy(policy, loop.make_experiment(tiny_arms), best=True)
+
+
 def test_signals_are_what_they_were_once_training_ends(finished_run, tiny_config, tmp_path):
     before = [signal.getsignal(name) for name in (signal.SIGINT, signal.SIGTERM)]
     folder = shutil.copytree(finished_run, tmp_path / "run")
