@@ -137,12 +137,11 @@ def test_a_torque_limit_is_what_the_motor_can_give_and_not_what_a_servo_is_told(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", range(4))
-def test_three_hundred_damaged_files_are_read_or_refused_in_one_line(part, tmp_path):
-    """pytest -m slow tests/hardware/test_robot_file.py (4 x 75 files, about a minute each)"""
+def test_three_hundred_damaged_files_are_read_or_refused_in_one_line(tmp_path):
+    """pytest -m slow tests/hardware/test_robot_file.py (a minute and a half)"""
     real = [(robots_path() / name).read_text() for name in ("catalogue/panda.urdf", "arm_peg.xml")]
-    draw, outcomes = random.Random(part), {"read": 0, "refused": 0}
-    for number in range(75):
+    draw, outcomes = random.Random(0), {"read": 0, "refused": 0}
+    for number in range(300):
         text = list(draw.choice([arm(3), MJCF, GRIPPER, FORK, arm(7), *real]))
         for _ in range(draw.choice([1, 3, 10, 40])):
             place = draw.randrange(len(text))
@@ -163,7 +162,7 @@ def test_three_hundred_damaged_files_are_read_or_refused_in_one_line(part, tmp_p
         assert "\n" not in (message or "")
         assert "without an answer" not in (message or ""), f"{path}: MuJoCo crashed"
         assert "not read within" not in (message or "")
-    assert min(outcomes.values()) > 1, outcomes
+    assert min(outcomes.values()) > 10, outcomes
 
 
 def try_to_read(path) -> str | None:
