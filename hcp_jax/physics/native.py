@@ -16,6 +16,9 @@ _WARNING = mujoco.mjtWarning
 _DIVERGED = [int(_WARNING.mjWARN_BADQPOS), int(_WARNING.mjWARN_BADQVEL), int(_WARNING.mjWARN_BADQACC)]
 _OVERFLOWED = [int(_WARNING.mjWARN_CONTACTFULL), int(_WARNING.mjWARN_CNSTRFULL)]
 _COUNT = 1  # of the two numbers per warning: last info, count
+# Counts start here, since MuJoCo prints a warning that it counts as the first (on a terminal and into MUJOCO_LOG.TXT). A world that
+# diverged is reset by MuJoCo, its counts too, and counts one warning then.
+_COUNTED_BEFORE = 2
 
 
 class NativePhysics:
@@ -117,10 +120,10 @@ class _Worlds:
         if state.mocap_pos is not None:
             batch.mocap_pos[:] = state.mocap_pos
         batch.time[:] = 0
-        batch.warning[:] = 0
+        batch.warning[:] = _COUNTED_BEFORE
         batch.step(nstep=num_substeps)
         qpos, qvel, warmstart = (np.asarray(a, np.float32) for a in (batch.qpos, batch.qvel, batch.qacc_warmstart))
-        diverged = batch.warning[:, _DIVERGED, _COUNT].any(axis=1)
+        diverged = (batch.warning[:, _DIVERGED, _COUNT] != _COUNTED_BEFORE).any(axis=1)
         if diverged.any():
             qpos[diverged] = qvel[diverged] = warmstart[diverged] = np.nan
-        return qpos, qvel, warmstart, batch.warning[:, _OVERFLOWED, _COUNT].any(axis=1)
+        return qpos, qvel, warmstart, (batch.warning[:, _OVERFLOWED, _COUNT] > _COUNTED_BEFORE).any(axis=1)

@@ -131,8 +131,21 @@ def test_native_marks_diverged_worlds_and_only_those(pool, initial):
     physics = make_physics("native", pool, SIM_DT, "euler")
     robots = pool.take(np.arange(pool.num_robots))
     broken = initial.replace(qvel=initial.qvel.at[7, 2].set(1e12))
-    state, _ = physics.step(robots, broken, jnp.zeros((pool.num_robots, 3)), NUM_SUBSTEPS)
+    state, overflow = physics.step(robots, broken, jnp.zeros((pool.num_robots, 3)), NUM_SUBSTEPS)
     assert np.flatnonzero(~np.asarray(is_plausible(state))).tolist() == [7]
+    assert int(overflow) == 0
+
+
+def test_a_diverged_world_neither_prints_nor_logs_a_warning_of_mujoco(pool, initial, capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    physics = make_physics("native", pool, SIM_DT, "euler")
+    robots = pool.take(np.arange(pool.num_robots))
+    broken = initial.replace(qvel=initial.qvel.at[7, 2].set(1e12))
+    for _ in range(2):
+        state, _ = physics.step(robots, broken, jnp.zeros((pool.num_robots, 3)), NUM_SUBSTEPS)
+        assert not bool(is_plausible(state)[7])
+    assert capfd.readouterr() == ("", "")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_unknown_engine_or_integrator_is_refused(pool):
