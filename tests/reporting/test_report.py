@@ -408,5 +408,5 @@ def test_committed_records_are_read_whole():
 
 def test_a_row_says_where_its_joints_stand_if_they_are_not_packed():
     row = read_table(ROOT / "results" / "table1.json")[0]
-    named = {layout: name_inputs(dataclasses.replace(row, joint_slots=layout, network="flat")) for layout in ("packed", "aligned")}
-    assert named == {"packed": row.encoding, "aligned": f"{row.encoding}, aligned joints"}
+    rows = [dataclasses.replace(row, joint_slots=layout, network="flat") for layout in ("packed", "aligned")]
+    assert [name_inputs(row) for row in rows] == [row.encoding, f"{row.encoding}, aligned joints"]
