@@ -13,7 +13,7 @@ from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, check_type
 from hcp_jax.evaluation.records import QUANTILES
 from hcp_jax.evaluation.statistics import describe_evaluation
 from hcp_jax.experiment.arm import ArmExperiment, load_own_robot, make_evaluator, make_heldout_arms
-from hcp_jax.experiment.build import make_experiment
+from hcp_jax.experiment.build import for_own_robots, make_experiment
 from hcp_jax.hardware.arm import ALL_TYPES, type_name
 from hcp_jax.hardware.inverse_kinematics import is_reachable
 from hcp_jax.hardware.own_arm import make_own_pool
@@ -59,7 +59,7 @@ def evaluate_arms(
     """
     config = run_folder.read_config(folder)
     check_types(config, types)
-    run = make_experiment(config, physics)
+    run = make_experiment(for_own_robots(config) if own_robots else config, physics)
     assert isinstance(run, ArmExperiment)
     iteration, state = load_policy(folder, run, best)
     record = describe_evaluation(run, folder, iteration, trials, robots_per_trial, ranges, pool_folder, seed, best)

@@ -1,6 +1,9 @@
 """From a config to its experiment."""
 
-from hcp_jax.config import Config
+import dataclasses
+
+from hcp_jax.config import ArmPoolConfig, Config
+from hcp_jax.config.arm import OWN_ARM_CONDITIONINGS
 from hcp_jax.experiment.arm import ArmExperiment, make_arm_experiment
 from hcp_jax.experiment.hopper import HopperExperiment, make_hopper_experiment
 from hcp_jax.physics.base import default_physics
@@ -17,3 +20,11 @@ def make_experiment(config: Config, physics: str = "auto") -> ArmExperiment | Ho
     physics = default_physics() if physics == "auto" else physics
     make = make_hopper_experiment if config.task == "hopper" else make_arm_experiment
     return make(config, physics)
+
+
+def for_own_robots(config: Config) -> Config:
+    """A config whose policy plays arms from files as that of `config` does, and which is built sooner: with one robot of each
+    type, where v_h does not depend on the others."""
+    if not isinstance(config.pool, ArmPoolConfig) or config.encoding not in OWN_ARM_CONDITIONINGS:
+        return config
+    return dataclasses.replace(config, pool=dataclasses.replace(config.pool, robots_per_type=1, heldout_per_type=1))

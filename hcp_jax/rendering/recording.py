@@ -10,7 +10,7 @@ import numpy as np
 
 from hcp_jax.config import ArmPoolConfig, Config, ConfigError
 from hcp_jax.experiment.arm import ArmExperiment, make_evaluator
-from hcp_jax.experiment.build import make_experiment
+from hcp_jax.experiment.build import for_own_robots, make_experiment
 from hcp_jax.experiment.chosen_robots import TRAINED, Choice, check_choice, heldout_kinds, make_chosen_pool
 from hcp_jax.experiment.hopper import HopperExperiment, heldout_v_h, train_v_h
 from hcp_jax.experiment.hopper import make_evaluator as make_hopper_evaluator
@@ -76,7 +76,7 @@ def record_episodes(
     if not own_robot:
         robots = robots or default_robots(config)
         check_robots(config, robots)
-    run = make_experiment(config, physics)
+    run = make_experiment(for_own_robots(config) if own_robot else config, physics)
     state = load_policy(folder, run, best)[1]
     key = jax.random.key(seed)
     if isinstance(run, HopperExperiment):

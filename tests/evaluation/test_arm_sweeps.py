@@ -3,7 +3,9 @@ import pytest
 
 from hcp_jax.config import ConfigError
 from hcp_jax.evaluation.arm_sweeps import evaluate_arms
+from hcp_jax.experiment.build import for_own_robots
 from hcp_jax.hardware.arm_pool import make_arm_pool
+from hcp_jax.hardware.catalogue import load_robot
 from hcp_jax.hardware.ranges import ArmRanges
 
 
@@ -55,3 +57,12 @@ def test_a_saved_pool_is_played_in_order_type_by_type(finished_arms, tmp_path):
     assert [robot["type"] for robot in record["robots"]] == ["I"] * 3 + ["B"] * 3
     with pytest.raises(ConfigError, match="the pool has robots of type I, B"):
         evaluate_arms(finished_arms, 1, 3, types=("H",), pool_folder=tmp_path / "pool")
+
+
+def test_an_arm_from_a_file_is_played_the_same_whether_or_not_the_training_arms_are_built(finished_arms, monkeypatch):
+    settings = {"trials": 1, "robots_per_trial": 3, "own_robots": {"panda": load_robot("panda")}}
+    sooner = evaluate_arms(finished_arms, **settings)
+    built = []
+    monkeypatch.setattr("hcp_jax.evaluation.arm_sweeps.for_own_robots", lambda config: built.append(config) or config)
+    assert evaluate_arms(finished_arms, **settings) == sooner
+    assert for_own_robots(built[0]).pool.num_robots < built[0].pool.num_robots
