@@ -8,22 +8,20 @@ masses and joint dynamics are drawn from `pool.ranges`.
 import dataclasses
 
 from hcp_jax import presets
-from hcp_jax.config import ArmPoolConfig, Config
-from hcp_jax.hardware.ranges import ArmRanges
+from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    ranges = ArmRanges(mass_ratio=(0.8, 1.25), damping=(0.1, 5.0), frictionloss=(0.0, 2.0), armature=(0.01, 0.5))
     return presets.arm(
         "finetune",
         "reacher",
         "chain_fk+jacobian+dynamics",
         robot="panda",
-        pool=ArmPoolConfig(types=(), left_out=(), robots_per_type=1, heldout_per_type=100, ranges=ranges),
+        pool=presets.one_arm(robots_per_type=1),
         init="results/policies/reacher_chains_s0",
         init_layers="all",
-        total_env_steps=1_280_000,
-        eval_every=128_000,
+        total_env_steps=256_000,
+        eval_every=64_000,
         ddpg=dataclasses.replace(
             presets.FAST_DDPG,
             **presets.SMALL_BATCHES,

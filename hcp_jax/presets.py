@@ -120,6 +120,12 @@ def only(robot_type: str, **changes) -> ArmPoolConfig:
     return ArmPoolConfig(**{"types": (robot_type,), "left_out": (), "heldout_per_type": 100} | changes)
 
 
+def one_arm(robots_per_type: int) -> ArmPoolConfig:
+    """Variants of `Config.robot`: itself if there is one, else masses and joint dynamics are drawn around a real arm's."""
+    ranges = ArmRanges(mass_ratio=(0.8, 1.25), damping=(0.1, 5.0), frictionloss=(0.0, 2.0), armature=(0.01, 0.5))
+    return ArmPoolConfig(types=(), left_out=(), robots_per_type=robots_per_type, heldout_per_type=100, ranges=ranges)
+
+
 def only_dynamics(**ranges) -> ArmPoolConfig:
     """100 arms of type I with nominal links (paper, appendix, "Effect of Dynamics"). `ranges` are fields of `ArmRanges`."""
     return only("I", robots_per_type=100, ranges=dataclasses.replace(nominal_lengths(ArmRanges()), **ranges))

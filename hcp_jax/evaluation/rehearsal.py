@@ -44,6 +44,15 @@ class Conditions:
 
 IDEAL = Conditions()
 REAL = Conditions(gravity_compensation=True, angle_noise=0.005, velocity_noise=0.05, jitter=0.005, delay=1)
+# What is reported: each part of `REAL` alone tells what a policy cannot stand.
+CONDITIONS = {
+    "ideal": IDEAL,
+    "gravity compensation": Conditions(gravity_compensation=True),
+    "noise": Conditions(angle_noise=REAL.angle_noise, velocity_noise=REAL.velocity_noise),
+    "jitter": Conditions(jitter=REAL.jitter),
+    "delay": Conditions(delay=REAL.delay),
+    "real": REAL,
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,7 +69,7 @@ class Trial:
 def rehearse(
     folder: pathlib.Path, robot_name: str, num_goals: int, base: str | None = None, tip: str | None = None, seed: int = 0
 ) -> dict:
-    """Plays a policy on one arm, towards the same goals under `IDEAL` and under `REAL` conditions.
+    """Plays a policy on one arm, towards the same goals under each of `CONDITIONS`.
 
     Args:
         folder: a run folder, or a published policy, of the reacher.
@@ -95,7 +104,7 @@ def rehearse(
         "seed": seed,
         "conditions": {},
     }
-    for name, conditions in (("ideal", IDEAL), ("real", REAL)):
+    for name, conditions in CONDITIONS.items():
         model = make_model(robot, conditions)
         trials = [
             play(model, act, start, goal, conditions, config.env, np.random.default_rng([seed, number]))

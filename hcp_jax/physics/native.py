@@ -16,8 +16,8 @@ _WARNING = mujoco.mjtWarning
 _DIVERGED = [int(_WARNING.mjWARN_BADQPOS), int(_WARNING.mjWARN_BADQVEL), int(_WARNING.mjWARN_BADQACC)]
 _OVERFLOWED = [int(_WARNING.mjWARN_CONTACTFULL), int(_WARNING.mjWARN_CNSTRFULL)]
 _COUNT = 1  # of the two numbers per warning: last info, count
-# Counts start here, since MuJoCo prints a warning that it counts as the first (on a terminal and into MUJOCO_LOG.TXT). A world that
-# diverged is reset by MuJoCo, its counts too, and counts one warning then.
+# Counts start here, since MuJoCo prints a warning that it counts as the first (on a terminal and into MUJOCO_LOG.TXT). A
+# world that diverged is reset by MuJoCo, its counts too, and counts one warning then.
 _COUNTED_BEFORE = 2
 
 

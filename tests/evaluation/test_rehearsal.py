@@ -7,7 +7,7 @@ import pytest
 
 from hcp_jax import rehearse
 from hcp_jax.config import ArmConfig
-from hcp_jax.evaluation.rehearsal import IDEAL, REAL, Conditions, make_model, play
+from hcp_jax.evaluation.rehearsal import CONDITIONS, IDEAL, REAL, Conditions, make_model, play
 from hcp_jax.experiment.chosen_robots import ChosenRobot
 from hcp_jax.hardware.arm_pool import make_arm_pool
 from hcp_jax.hardware.ranges import ArmRanges
@@ -85,15 +85,23 @@ def test_an_episode_ends_where_the_goal_is_reached(arm):
     assert (trial.success, trial.episode_length) == (True, 1)
 
 
+def test_real_conditions_are_the_parts_that_are_also_tried_alone():
+    parts = [dataclasses.asdict(CONDITIONS[name]) for name in CONDITIONS if name not in ("ideal", "real")]
+    ideal, together = dataclasses.asdict(IDEAL), {}
+    for part in parts:
+        together |= {name: value for name, value in part.items() if value != ideal[name]}
+    assert together == dataclasses.asdict(REAL)
+
+
 @pytest.mark.slow
-def test_the_command_writes_each_goal_under_both_conditions(finished_arms, tmp_path, capsys):
+def test_the_command_writes_each_goal_under_all_conditions(finished_arms, tmp_path, capsys):
     rehearse.main([str(finished_arms), "--robot", "H:1", "--goals", "3", "--json", str(tmp_path / "record.json")])
     record = json.loads((tmp_path / "record.json").read_text())
-    assert set(record["conditions"]) == {"ideal", "real"}
+    assert list(record["conditions"]) == list(CONDITIONS)
     for row in record["conditions"].values():
         distances = [trial["final_distance"] for trial in row["trials"]]
         assert len(distances) == 3
         assert row["final_distance_quantiles"]["1"] == max(distances)
     goals = [[trial["goal"] for trial in row["trials"]] for row in record["conditions"].values()]
-    assert goals[0] == goals[1]
+    assert all(one == goals[0] for one in goals)
     assert "H:1" in capsys.readouterr().out
