@@ -1,4 +1,4 @@
-"""Exp. VII of the paper: peg insertion, fixed hole, type E left out; HCP-E with Jacobians. Preset: fast."""
+"""Exp. VII of the paper: peg insertion, fixed hole, type E left out; HCP-E with Jacobians, packed joints. Preset: fast."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config

@@ -1,4 +1,4 @@
-"""Exp. V of the paper: peg insertion, fixed hole, type H left out; HCP-E with Jacobians. Preset: fast."""
+"""Exp. V of the paper: peg insertion, fixed hole, type H left out; HCP-E with Jacobians, packed joints. Preset: fast."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config

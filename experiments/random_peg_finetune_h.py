@@ -1,6 +1,6 @@
 """Fine-tuning Exp. XI: HCP-E that never saw type H goes on with type H alone. Preset: fast.
 
-Set `--config.init=runs/random_peg_jacobian_leave_h` to another run folder; `--config.init=` trains the same from scratch.
+Set `--config.init=runs/random_peg_aligned_leave_h` to another run folder; `--config.init=` trains the same from scratch.
 """
 
 from hcp_jax import presets
@@ -13,7 +13,8 @@ def get_config() -> Config:
         "peg_insertion",
         "chain_fk+jacobian",
         random_hole=presets.RANDOM_HOLE,
+        joint_slots="aligned",
         pool=presets.only("H"),
-        init="runs/random_peg_jacobian_leave_h",
+        init="runs/random_peg_aligned_leave_h",
         init_layers="all",
     )

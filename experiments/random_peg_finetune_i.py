@@ -1,6 +1,6 @@
 """Fine-tuning Exp. XV: HCP-E that never saw type I goes on with type I alone. Preset: fast.
 
-Set `--config.init=runs/random_peg_jacobian_leave_i` to another run folder; `--config.init=` trains the same from scratch.
+Set `--config.init=runs/random_peg_aligned_leave_i` to another run folder; `--config.init=` trains the same from scratch.
 """
 
 from hcp_jax import presets
@@ -13,7 +13,8 @@ def get_config() -> Config:
         "peg_insertion",
         "chain_fk+jacobian",
         random_hole=presets.RANDOM_HOLE,
+        joint_slots="aligned",
         pool=presets.only("I"),
-        init="runs/random_peg_jacobian_leave_i",
+        init="runs/random_peg_aligned_leave_i",
         init_layers="all",
     )

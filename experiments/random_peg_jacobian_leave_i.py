@@ -1,4 +1,4 @@
-"""Exp. XV of the paper: peg insertion, random hole, type I left out; HCP-E with Jacobians. Preset: fast."""
+"""Exp. XV of the paper: peg insertion, random hole, type I left out; HCP-E with Jacobians, packed joints. Preset: fast."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config

@@ -1,7 +1,7 @@
 """`python -m hcp_jax.benchmark physics|learner|train|scale [--config FILE] [--rows NAME ...] [--json FILE]`"""
 
 import argparse
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import jax
 from rich.console import Console
@@ -82,7 +82,7 @@ def measure(options: argparse.Namespace, config: Config) -> Iterable[dict]:
     return times_to_success(options, config, rows)
 
 
-def times_to_success(options: argparse.Namespace, config: Config, rows: list[str]) -> Iterator[dict]:
+def times_to_success(options: argparse.Namespace, config: Config, rows: Sequence[str]) -> Iterator[dict]:
     for name in rows:
         if name in ("hcp_jax", "sb3-her"):
             yield time_to_success(config, name, options.to_success, options.limit)

@@ -131,7 +131,9 @@ def only_dynamics(**ranges) -> ArmPoolConfig:
     return only("I", robots_per_type=100, ranges=dataclasses.replace(nominal_lengths(ArmRanges()), **ranges))
 
 
-def arm(name: str, task: str, encoding: str, left_out: str = "", random_hole: float = 0.0, **changes) -> Config:
+def arm(
+    name: str, task: str, encoding: str, left_out: str = "", random_hole: float = 0.0, joint_slots: str = "packed", **changes
+) -> Config:
     """An arm experiment with the `fast` preset that trains on types A to I without those in `left_out`.
 
     `changes` are fields of `Config`.
@@ -143,7 +145,7 @@ def arm(name: str, task: str, encoding: str, left_out: str = "", random_hole: fl
         encoding=encoding,
         num_envs=FAST_NUM_ENVS,
         pool=ArmPoolConfig(types=tuple(t for t in ARM_TYPES if t not in left_out), left_out=tuple(left_out)),
-        env=ArmConfig(random_hole=random_hole, approach_starts=APPROACH_STARTS[task]),
+        env=ArmConfig(random_hole=random_hole, approach_starts=APPROACH_STARTS[task], joint_slots=joint_slots),
         **ARM_SCHEDULES[task],
     )
     return dataclasses.replace(config, **changes)

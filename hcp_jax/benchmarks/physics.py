@@ -12,7 +12,7 @@
 import functools
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import jax
 import jax.numpy as jnp
@@ -35,7 +35,7 @@ REPEATS = 3
 _MJX_JAX_ON_CPU = {"xla_cpu_use_fusion_emitters": False}
 
 
-def benchmark_physics(config: Config, batches: list[int], rows: list[str], seconds: float) -> Iterator[dict]:
+def benchmark_physics(config: Config, batches: list[int], rows: Sequence[str], seconds: float) -> Iterator[dict]:
     """Times `rows` out of `ROWS` with each batch of robots of the config's training pool, repeated where it is smaller.
 
     Args:

@@ -13,7 +13,7 @@ DDPG. The peers need the extra `bench`.
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import jax
 import jax.numpy as jnp
@@ -39,7 +39,7 @@ def samples_per_step(config: Config) -> float:
     return config.ddpg.updates_per_iteration * config.ddpg.batch_size / config.batch_size
 
 
-def benchmark_training(config: Config, rows: list[str], seconds: float) -> Iterator[dict]:
+def benchmark_training(config: Config, rows: Sequence[str], seconds: float) -> Iterator[dict]:
     """Times control steps of training.
 
     Args:

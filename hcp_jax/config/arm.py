@@ -5,6 +5,7 @@ import dataclasses
 from hcp_jax.config.checks import is_at_least_zero, is_positive, require
 from hcp_jax.hardware.arm import ALL_TYPES
 from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS
+from hcp_jax.hardware.joint_slots import LAYOUTS
 from hcp_jax.hardware.ranges import TYPE_STRIDE, ArmRanges, ChainRanges
 from hcp_jax.physics.base import INTEGRATORS
 
@@ -74,6 +75,8 @@ class ArmConfig:
         observation_noise: half-width of the uniform noise on joint angles [rad] and velocities [rad/s].
         success_distance: of the point of interest from the goal [m].
         action_cost: weight of |action|^2 in the reward.
+        joint_slots: where joints stand in observations, actions and features of v_h: `packed`, zeros at the end where an arm
+            has fewer than seven (paper), or `aligned`, zeros where the type lacks the joint (`hcp_jax.hardware.joint_slots`).
     """
 
     integrator: str = "implicitfast"
@@ -83,8 +86,10 @@ class ArmConfig:
     observation_noise: float = 0.02
     success_distance: float = 0.02
     action_cost: float = 0.1
+    joint_slots: str = "packed"
 
     def __post_init__(self):
+        require(self.joint_slots in LAYOUTS, "env.joint_slots", self.joint_slots, f"one of {', '.join(LAYOUTS)}")
         require(self.integrator in INTEGRATORS, "env.integrator", self.integrator, f"one of {', '.join(INTEGRATORS)}")
         require(self.episode_length >= 1, "env.episode_length", self.episode_length, "at least 1")
         require(is_positive(self.success_distance), "env.success_distance", self.success_distance, "a number above 0")

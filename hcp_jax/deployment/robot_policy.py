@@ -8,11 +8,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from hcp_jax.config import ArmConfig
 from hcp_jax.envs.hopper import MAX_OBSERVED_VELOCITY
 from hcp_jax.experiment.arm import ArmExperiment, make_goal_conditioning
 from hcp_jax.experiment.chosen_robots import ChosenRobot
 from hcp_jax.experiment.hopper import HopperExperiment, heldout_v_h, train_v_h
 from hcp_jax.hardware.chain import MAX_JOINTS
+from hcp_jax.hardware.joint_slots import JointSlots
 
 Entries = tuple[tuple[str, str], ...]  # (name, unit) of each entry of a vector
 
@@ -51,12 +53,16 @@ def _arm_policy(run: ArmExperiment, state: Any, robot: ChosenRobot) -> Callable[
         rows, row = networks["embedding"], robot.trained_row
         networks = networks | {"embedding": (rows.mean(axis=0) if row is None else rows[row])[None]}
     count = len(robot.joints)
+    assert isinstance(run.config.env, ArmConfig)
+    slots = JointSlots(robot.pool, run.config.env.joint_slots)
 
     def act(obs: jax.Array) -> jax.Array:
         angles, velocities, goal = jnp.split(obs, [count, 2 * count])
-        padded = jnp.concatenate([jnp.pad(part, (0, MAX_JOINTS - count)) for part in (angles, velocities)])
         index = jnp.zeros(1, jnp.int32)
-        return run.learner.mean_action(networks, statistics, conditioning, index, padded[None], goal[None])[0, :count]
+        padded = [jnp.pad(part[None], ((0, 0), (0, MAX_JOINTS - count))) for part in (angles, velocities)]
+        obs = jnp.concatenate([slots.to_entries(part, index) for part in padded], axis=-1)
+        action = run.learner.mean_action(networks, statistics, conditioning, index, obs, goal[None])
+        return slots.to_joints(action, index)[0, :count]
 
     return act
 

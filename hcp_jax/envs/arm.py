@@ -1,7 +1,7 @@
 """The arm's tasks: reacher and peg insertion (paper, section 5.1 and appendix; facts/FACTS.md, "Tasks").
 
 50 Hz torque control for 200 steps, without gravity compensation. Observation: 7 joint angles and 7 joint velocities with noise,
-zeros for missing joints. Action: 7 torques in units of each joint's limit.
+zeros for missing joints. Action: 7 torques in units of each joint's limit. Their order is `ArmTask.joint_slots`.
 """
 
 import dataclasses
@@ -31,6 +31,7 @@ class ArmTask:
         observation_noise: half-width of the uniform noise on angles [rad] and velocities [rad/s]; the observation's alone.
         success_distance: of the point of interest from the goal [m].
         action_cost: weight of |action|^2 in the reward (paper: beta = 0.1).
+        joint_slots: layout of joints in observations and actions (`hcp_jax.hardware.joint_slots`).
     """
 
     name: str
@@ -41,6 +42,7 @@ class ArmTask:
     observation_noise: float = 0.02
     success_distance: float = 0.02
     action_cost: float = 0.1
+    joint_slots: str = "packed"
     observation_size: int = dataclasses.field(default=2 * MAX_JOINTS, init=False)
     action_size: int = dataclasses.field(default=MAX_JOINTS, init=False)
     goal_size: int = dataclasses.field(default=3, init=False)

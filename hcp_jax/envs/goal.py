@@ -17,6 +17,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
+from hcp_jax.hardware.joint_slots import JointSlots
 from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.physics.base import Physics, PhysicsState, is_plausible, select_rows
@@ -67,6 +68,8 @@ class GoalTask(Protocol):
     def observation_noise(self) -> float: ...
     @property
     def approach_starts(self) -> float: ...
+    @property
+    def joint_slots(self) -> str: ...
     def sample_goal(self, key: jax.Array, num_envs: int) -> jax.Array: ...
     def table_position(self, goal: jax.Array) -> jax.Array | None: ...
     def compute_reward(
@@ -94,6 +97,7 @@ class GoalEnv:
         hardware = {name: jnp.asarray(values, jnp.float32) for name, values in pool.hardware.items()}
         self._chain_pos, self._chain_rotation = hardware["chain_pos"], quat_to_matrix(hardware["chain_quat"])
         self._joint_mask, self._start_angles = hardware["joint_mask"], hardware["start_angles"]
+        self._slots = JointSlots(pool, task.joint_slots)
         self._approach = {name: hardware[name] for name in APPROACH if task.approach_starts}
 
     def reset(self, key: jax.Array, index: jax.Array) -> GoalState:
@@ -124,8 +128,9 @@ class GoalEnv:
         """One control step of every world. Actions are clipped to [-1, 1]."""
         chex.assert_shape(action, (state.index.shape[0], self.action_size))
         key, key_noise = jax.random.split(state.key)
-        action = jnp.clip(action, -1.0, 1.0) * self._joint_mask[state.index]
-        after, overflow = self.physics.step(self.pool.take(state.index), state.physics, action, self.task.num_substeps)
+        torque = self._slots.to_joints(jnp.clip(action, -1.0, 1.0), state.index) * self._joint_mask[state.index]
+        after, overflow = self.physics.step(self.pool.take(state.index), state.physics, torque, self.task.num_substeps)
+        action = self._slots.to_entries(torque, state.index)
         plausible = is_plausible(after)
         after = select_rows(plausible, after, state.physics)
         achieved_goal = self._point_of_interest(after.qpos, state.index)
@@ -160,7 +165,8 @@ class GoalEnv:
         """Noisy joint angles and velocities, 0 for missing joints: [B, 14]."""
         state = jnp.concatenate([physics.qpos, jnp.clip(physics.qvel, -MAX_SPEED, MAX_SPEED)], axis=-1)
         noise = jax.random.uniform(key, state.shape, minval=-1.0, maxval=1.0) * self.task.observation_noise
-        return (state + noise) * jnp.tile(self._joint_mask[index], 2)
+        seen = (state + noise) * jnp.tile(self._joint_mask[index], 2)
+        return jnp.concatenate([self._slots.to_entries(part, index) for part in jnp.split(seen, 2, axis=-1)], axis=-1)
 
     def _point_of_interest(self, qpos: jax.Array, index: jax.Array) -> jax.Array:
         """[B, 3] m in the world."""

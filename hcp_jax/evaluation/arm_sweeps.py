@@ -116,7 +116,7 @@ def evaluate_type(
     episodes = evaluator(run.learner.policy(state), index, key_play)
     goals, within = np.asarray(episodes.desired_goal), config.env.success_distance
     reachable = is_reachable(pool.subset(index), goals, within, key_goal, config.task == "peg_insertion")
-    stuck = immovable_joints(pool)[index].any(axis=1)
+    stuck = np.asarray(immovable_joints(pool)[index].any(axis=1))
     return summarise_type(episodes, reachable, stuck, trials), robot_rows(pool, episodes, reachable)
 
 

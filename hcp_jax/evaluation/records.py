@@ -87,16 +87,23 @@ def read_table(path: pathlib.Path) -> list[TableRow]:
 
 
 def _table_row(row: dict) -> TableRow:
-    texts = {name: str(row[name]) for name in ("task", "train_types", "test_type", "algorithm", "encoding", "network")}
-    numbers = {name: number(row[name]) for name in ("success_mean", "success_std_over_trials", "wall_seconds")}
-    may_lack = ("success_std_over_seeds", "reachable_success_mean", "paper_mean", "paper_std")
     return TableRow(
-        **texts,
-        **numbers,
-        **{name: optional_number(row[name]) for name in may_lack},
         experiment=None if row["experiment"] is None else int(row["experiment"]),
+        task=str(row["task"]),
+        train_types=str(row["train_types"]),
+        test_type=str(row["test_type"]),
+        algorithm=str(row["algorithm"]),
+        encoding=str(row["encoding"]),
+        network=str(row["network"]),
         seeds=tuple(int(seed) for seed in row["seeds"]),
+        success_mean=number(row["success_mean"]),
+        success_std_over_trials=number(row["success_std_over_trials"]),
+        success_std_over_seeds=optional_number(row["success_std_over_seeds"]),
+        reachable_success_mean=optional_number(row["reachable_success_mean"]),
         control_steps=int(row["control_steps"]),
+        wall_seconds=number(row["wall_seconds"]),
+        paper_mean=optional_number(row["paper_mean"]),
+        paper_std=optional_number(row["paper_std"]),
         policy=tuple(str(name) for name in row["policy"]),
         commit=tuple(str(name) for name in row["commit"]),
     )

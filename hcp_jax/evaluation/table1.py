@@ -74,8 +74,8 @@ def find_paper(config: Config, left_out: str) -> tuple[int | None, tuple[float, 
     of_paper = PAPER.get((config.task, config.env.random_hole > 0, left_out))
     if of_paper is None or config.encoding.startswith("none+"):
         return None, None
-    is_baseline = config.encoding == "none"
-    return of_paper[0] + is_baseline, of_paper[1 + is_baseline]
+    number, conditioned, baseline = of_paper
+    return (number + 1, baseline) if config.encoding == "none" else (number, conditioned)
 
 
 def sort_rows(rows: Sequence[dict]) -> list[dict]:

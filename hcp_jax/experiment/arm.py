@@ -188,8 +188,9 @@ def make_goal_conditioning(config: Config, pool: RobotPool, train_pool: RobotPoo
     embedding = None
     if config.encoding == "embedding":
         embedding = Embedding(pool.num_robots, config.embedding.size, config.embedding.initial_scale)
-    env = ArmTask(config.task)
-    return GoalConditioning(pool, config.encoding, train_pool, env.observation_size, env.goal_size, embedding)
+    assert isinstance(config.env, ArmConfig)
+    sizes = (ArmTask.observation_size, ArmTask.goal_size)
+    return GoalConditioning(pool, config.encoding, train_pool, *sizes, embedding, config.env.joint_slots)
 
 
 def make_evaluator(

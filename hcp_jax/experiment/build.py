@@ -1,13 +1,12 @@
 """From a config to its experiment."""
 
 from hcp_jax.config import Config
-from hcp_jax.experiment.arm import make_arm_experiment
-from hcp_jax.experiment.base import Experiment
-from hcp_jax.experiment.hopper import make_hopper_experiment
+from hcp_jax.experiment.arm import ArmExperiment, make_arm_experiment
+from hcp_jax.experiment.hopper import HopperExperiment, make_hopper_experiment
 from hcp_jax.physics.base import default_physics
 
 
-def make_experiment(config: Config, physics: str = "auto") -> Experiment:
+def make_experiment(config: Config, physics: str = "auto") -> ArmExperiment | HopperExperiment:
     """Builds the pools, compiles the robots and sets up learner and evaluator.
 
     Args:

@@ -46,7 +46,8 @@ class NativePhysics:
         def step_own_worlds(robot_id: jax.Array, state: PhysicsState, ctrl: jax.Array):
             return self._step_on_device(robot_id, state, ctrl, num_substeps)
 
-        arguments, num_worlds, mesh = (robots.robot_id, state, ctrl), ctrl.shape[0], get_mesh()
+        num_worlds, mesh = ctrl.shape[0], get_mesh()
+        arguments: tuple = (robots.robot_id, state, ctrl)
         num_padded = -(-num_worlds // mesh.size) * mesh.size
         if num_padded != num_worlds:  # the first ones again, so that every device has as many
             arguments = jax.tree.map(lambda leaf: leaf[jnp.arange(num_padded) % num_worlds], arguments)

@@ -10,6 +10,8 @@
 | `none+end_effector` | 3 | no v_h, but the end effector's position: a control |
 | `none+goal_offset` | 3 | no v_h, but the end effector's offset from the goal: a control |
 
+Features of joints stand where `joint_slots` has the joints (`hcp_jax.hardware.joint_slots`); constants stay in their order.
+
 The offset is asinh((end effector - goal) / 0.02 m): a network that sees metres hardly tells 1 cm from 2 cm, and the goal's
 tolerance is 2 cm.
 """  # noqa: E501
@@ -19,6 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS, encode_arms
+from hcp_jax.hardware.joint_slots import JointSlots
 from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.random_chain import GRAVITY
@@ -41,12 +44,14 @@ class GoalConditioning:
         observation_size: int,
         goal_size: int,
         embedding: Embedding | None = None,
+        joint_slots: str = "packed",
     ):
         """Args:
         pool: the robots that `index` will name.
         encoding: one of `hcp_jax.config.arm.ARM_CONDITIONINGS`.
         reference: the training robots, whose ranges scale dynamics.
         embedding: the learned table, for `embedding`.
+        joint_slots: layout of observations (`hcp_jax.hardware.joint_slots`), which features of joints follow.
         """
         self.encoding, self._embedding = encoding, embedding
         self.is_learned = embedding is not None
@@ -54,6 +59,7 @@ class GoalConditioning:
         self._table = jnp.asarray(encode_arms(pool, encoding if is_constant else "none", reference))
         self._chain_pos = jnp.asarray(pool.hardware["chain_pos"], jnp.float32)
         self._chain_rotation = quat_to_matrix(jnp.asarray(pool.hardware["chain_quat"], jnp.float32))
+        self._slots = JointSlots(pool, joint_slots)
         self._joint_mask = jnp.asarray(pool.hardware["joint_mask"], jnp.float32)
         self._dynamics = {name: jnp.asarray(pool.hardware[name], jnp.float32) for name in _DYNAMICS if encoding == MOTOR_LOADS}
         v_h_size = embedding.size if embedding is not None else self._table.shape[1]
@@ -84,6 +90,7 @@ class GoalConditioning:
         if self.encoding not in POSE_FEATURES:
             return {"robot": [], "goal": []}
         angles, velocities = jnp.split(obs, 2, axis=-1)
+        angles, velocities = self._slots.to_joints(angles, index), self._slots.to_joints(velocities, index)
         positions, rotations = joint_poses(self._chain_pos[index], self._chain_rotation[index], angles)
         end_effector = positions[..., -1, :]
         offset = scale_offset(end_effector - goal)
@@ -93,15 +100,19 @@ class GoalConditioning:
             return {"robot": [], "goal": [offset]}
         mask = self._joint_mask[index][..., None]
         anchors, axes = positions[..., :-1, :] * mask, rotations[..., :-1, :, 2] * mask
-        robot, towards = [anchors, axes, end_effector, rotations[..., -1, :, :]], [offset]
+
+        def entries(values: jax.Array) -> jax.Array:
+            return self._slots.to_entries(values, index)
+
+        robot, towards = [entries(anchors), entries(axes), end_effector, rotations[..., -1, :, :]], [offset]
         if self.encoding in ("chain_fk+jacobian", MOTOR_LOADS):
             jacobian = jnp.cross(axes, end_effector[..., None, :] - anchors)
             turns = jnp.cross(axes, rotations[..., -1, None, :, 2])
-            robot += [jacobian, turns, jnp.einsum("...ij,...i->...j", jacobian, velocities)]
-            towards += [jnp.einsum("...ij,...j->...i", jacobian, soft_direction(goal - end_effector))]
+            robot += [entries(jacobian), entries(turns), jnp.einsum("...ij,...i->...j", jacobian, velocities)]
+            towards += [entries(jnp.einsum("...ij,...j->...i", jacobian, soft_direction(goal - end_effector)))]
         if self.encoding == MOTOR_LOADS:
             dynamics = {name: values[index] for name, values in self._dynamics.items()}
-            robot += motor_loads(dynamics, anchors, axes, positions, rotations)
+            robot += [entries(load) for load in motor_loads(dynamics, anchors, axes, positions, rotations)]
         flat = (*angles.shape[:-1], -1)
         return {"robot": [part.reshape(flat) for part in robot], "goal": towards}
 

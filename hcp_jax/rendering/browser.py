@@ -107,7 +107,7 @@ class ArmView:
         """Moves the goal to `goal` [3] m with the next tick."""
         self._asked_goal = goal
 
-    def _add_controls(self, types: tuple[str, ...], pool_config: ArmPoolConfig) -> None:
+    def _add_controls(self, types: list[str], pool_config: ArmPoolConfig) -> None:
         gui = self.server.gui
         self.robot_type = gui.add_dropdown("arm type", types)
         self.robot_type.on_update(lambda _: self._ask_robot(0.0))

@@ -120,10 +120,10 @@ def record_arms(run: ArmExperiment, state, pool: RobotPool, names: Sequence[str]
         pool=pool,
         names=tuple(names),
         outcomes=tuple(arm_outcome(*row) for row in zip(*columns, strict=True)),
-        qpos=states.qpos,
-        goal=episodes.desired_goal,
-        success=episodes.success,
-        length=episodes.episode_length,
+        qpos=np.asarray(states.qpos),
+        goal=np.asarray(episodes.desired_goal),
+        success=np.asarray(episodes.success),
+        length=np.asarray(episodes.episode_length),
         ctrl_dt=ctrl_dt,
     )
 
@@ -153,9 +153,9 @@ def record_hoppers(run: HopperExperiment, state, robots: Sequence[Choice], key: 
         pool=pool,
         names=tuple(map(str, robots)),
         outcomes=tuple(outcomes),
-        qpos=states.qpos,
+        qpos=np.asarray(states.qpos),
         goal=None,
-        success=~is_short,
-        length=episodes.episode_length,
+        success=~np.asarray(is_short),
+        length=np.asarray(episodes.episode_length),
         ctrl_dt=ctrl_dt,
     )

@@ -99,7 +99,7 @@ def make_finetuning(published: Published, letter: str, name: str) -> Item:
     tables = (compare_to_scratch(lines[0].curve, lines[1].curve, files),) if is_pair else ()
     train = f"python -m hcp_jax.train --config experiments/{name}.py --out runs/arms"
     commands = (
-        f"{train}/{name}_s0 --config.init=results/policies/random_peg_jacobian_leave_{letter.lower()}_s0",
+        f"{train}/{name}_s0 --config.init=results/policies/random_peg_aligned_leave_{letter.lower()}_s0",
         f"{train}/{scratch_name}_s0 --config.name={scratch_name} --config.init=",
         RESULTS_COMMANDS[1],
     )

@@ -175,4 +175,6 @@ def spread_of(label: str, encoding: str, outcome: Outcome, values: np.ndarray | 
 def describe_kinds(spreads: list[Spread]) -> str:
     """Whether a figure shows violins, boxes or both."""
     kinds = {spread.values is None for spread in spreads}
-    return {(True,): BOXES, (False,): VIOLINS}.get(tuple(kinds), f"{VIOLINS} {BOXES}")
+    if len(kinds) != 1:
+        return f"{VIOLINS} {BOXES}"
+    return BOXES if kinds == {True} else VIOLINS

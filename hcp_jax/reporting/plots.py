@@ -142,8 +142,8 @@ def draw_box(axes: Axes, place: int, quantiles: Sequence[float], colour: str) ->
     """Box from 25 to 75 %, whiskers from the lowest value to 95 %, a ring at the highest."""
     low, first, median, third, high, highest = quantiles
     box = {"whislo": low, "q1": first, "med": median, "q3": third, "whishi": high, "fliers": [highest]}
-    lines = {name: {"color": colour} for name in ("boxprops", "medianprops", "whiskerprops", "capprops")}
-    axes.bxp([box], [place], widths=0.5, flierprops={"markeredgecolor": colour, "marker": "o", "markersize": 4}, **lines)
+    line, ring = {"color": colour}, {"markeredgecolor": colour, "marker": "o", "markersize": 4}
+    axes.bxp([box], [place], widths=0.5, boxprops=line, medianprops=line, whiskerprops=line, capprops=line, flierprops=ring)
 
 
 def draw_embedding(embedding: np.ndarray, mass: np.ndarray) -> str:

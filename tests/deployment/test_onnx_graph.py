@@ -32,7 +32,7 @@ def one_arm() -> RobotPool:
     ],
 )
 def test_networks_and_their_inputs_give_the_same_in_onnx(encoding, actor, one_arm, key, rng):
-    conditioning = GoalConditioning(one_arm, encoding, one_arm, 14, 3)
+    conditioning = GoalConditioning(one_arm, encoding, one_arm, 14, 3, joint_slots="aligned")
     params = actor.init(key, jnp.zeros((1, conditioning.size)))
     params = jax.tree.map(lambda leaf: leaf + 0.3 * jax.random.normal(key, leaf.shape), params)
 

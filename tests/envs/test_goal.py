@@ -1,3 +1,5 @@
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -101,6 +103,29 @@ def test_missing_joints_are_0_and_their_actions_cost_and_do_nothing(reacher, key
     np.testing.assert_array_equal(moved.physics.qpos[:2], idle.physics.qpos[:2])
     assert np.abs(moved.physics.qpos[2:] - idle.physics.qpos[2:]).max() > 0
     np.testing.assert_allclose(transition.reward[2:], -1.2)
+
+
+def test_aligned_joints_move_as_packed_ones_do_and_stand_at_their_types_entries(reacher, key):
+    aligned = GoalEnv(dataclasses.replace(reacher.task, joint_slots="aligned"), reacher.pool, reacher.physics)
+    of_type_a = [0, 1, 3, 5, 6]  # without j2 and j4
+    packed = jax.random.uniform(key, (4, 7), minval=-1.0, maxval=1.0)
+    spread = packed.at[:2].set(5.0).at[:2, jnp.array(of_type_a)].set(packed[:2, :5])
+    _, expected, expected_transition = play(reacher, key, packed)
+    _, after, transition = play(aligned, key, spread)
+    np.testing.assert_array_equal(after.physics.qpos, expected.physics.qpos)
+    np.testing.assert_allclose(transition.reward, expected_transition.reward, rtol=1e-6)
+    for entries, joints in (
+        (transition.action, expected_transition.action),
+        *zip(halves(after), halves(expected), strict=True),
+    ):
+        np.testing.assert_array_equal(entries[:2, jnp.array(of_type_a)], joints[:2, :5])
+        np.testing.assert_array_equal(entries[:2, jnp.array([2, 4])], 0.0)
+        np.testing.assert_array_equal(entries[2:], joints[2:])
+
+
+def halves(state) -> list:
+    """Observed angles and velocities."""
+    return jnp.split(state.obs, 2, axis=-1)
 
 
 def test_the_achieved_goal_is_where_mujoco_has_the_point_of_interest(reacher, key):

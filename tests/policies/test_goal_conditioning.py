@@ -84,6 +84,27 @@ def test_chain_fk_holds_the_end_effector_its_offset_and_zeros_for_missing_joints
     assert (values[1, 15:21] != 0.0).all()
 
 
+@pytest.mark.parametrize("encoding", [name for name in LENGTHS if name.startswith("chain_fk")])
+def test_features_of_aligned_joints_are_those_of_packed_ones_at_their_types_entries(arms, encoding, angles, rng):
+    velocities = rng.normal(size=(2, 7)) * arms.hardware["joint_mask"]
+    slots = np.array([[0, 1, 2, 3, 6, 4, 5], [0, 1, 2, 3, 4, 5, 6]])  # D lacks j4 and j5
+    order = np.argsort(slots, axis=1)
+    packed = [jnp.asarray(part, jnp.float32) for part in (angles, velocities)]
+    aligned = [jnp.take_along_axis(part, order, axis=1) for part in packed]
+    conditionings = [GoalConditioning(arms, encoding, arms, 14, 3, joint_slots=layout) for layout in ("packed", "aligned")]
+    seen = [
+        np.asarray(conditioning.inputs(None, jnp.arange(2), jnp.concatenate(obs, axis=1), GOAL))
+        for conditioning, obs in zip(conditionings, (packed, aligned), strict=True)
+    ]
+    np.testing.assert_allclose(np.sort(seen[0], axis=1), np.sort(seen[1], axis=1), atol=1e-6)
+    np.testing.assert_allclose(seen[0][1], seen[1][1], atol=1e-6)
+    anchors = [values[0, 17:38].reshape(7, 3) for values in seen]
+    np.testing.assert_allclose(anchors[1][slots[0]], anchors[0], atol=1e-6)
+    if encoding != "chain_fk":
+        towards = [values[0, -7:] for values in seen]
+        np.testing.assert_allclose(towards[1][slots[0]], towards[0], atol=1e-6)
+
+
 def test_motor_loads_are_the_torques_that_mujoco_holds_the_arm_with_and_what_the_motors_make_of_the_rest(arms, angles):
     limit = np.where(arms.hardware["joint_mask"] > 0, arms.hardware["torque_limit"], 1.0)
     values = features(arms, "chain_fk+jacobian+dynamics", angles)
