@@ -1,5 +1,8 @@
-"""The catalogue's Sawyer alone, its masses and joint dynamics randomised, no v_h: policy C of the paper's test on a real Sawyer
-(figure "Testing distance distribution on a real sawyer robot"). Preset: fast with small batches."""
+"""The catalogue's Sawyer alone, its masses and joint dynamics randomised: policy C of the paper's test on a real Sawyer (figure
+"Testing distance distribution on a real sawyer robot"). Preset: fast with small batches.
+
+It sees the joint poses that Exp. I's policy sees, of this one arm. Without them it is at 0 % after 1.28 M steps.
+"""
 
 import dataclasses
 
@@ -11,7 +14,7 @@ def get_config() -> Config:
     return presets.arm(
         "reacher_sawyer",
         "reacher",
-        "none",
+        "chain_fk",
         robot="sawyer",
         pool=presets.one_arm(robots_per_type=100),
         total_env_steps=1_280_000,

@@ -65,6 +65,7 @@ class TableRow:
     test_type: str
     algorithm: str
     encoding: str
+    joint_slots: str
     network: str
     seeds: tuple[int, ...]
     success_mean: float
@@ -94,6 +95,7 @@ def _table_row(row: dict) -> TableRow:
         test_type=str(row["test_type"]),
         algorithm=str(row["algorithm"]),
         encoding=str(row["encoding"]),
+        joint_slots=str(row["joint_slots"]),
         network=str(row["network"]),
         seeds=tuple(int(seed) for seed in row["seeds"]),
         success_mean=number(row["success_mean"]),

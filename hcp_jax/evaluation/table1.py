@@ -89,7 +89,7 @@ def make_row(
     """What one experiment's seeds reach on one type of arms.
 
     Returns:
-        experiment, task, train_types, test_type, algorithm, encoding, network, seeds, success_mean,
+        experiment, task, train_types, test_type, algorithm, encoding, joint_slots, network, seeds, success_mean,
         success_std_over_trials (mean over seeds), success_std_over_seeds (of a sample, None of one seed),
         reachable_success_mean, control_steps, wall_seconds,
         paper_mean and paper_std (of HCP-E for every v_h, of DDPG+HER for none, None for controls), policy (names), commit.
@@ -97,6 +97,7 @@ def make_row(
     """
     config = runs[0][2]
     assert isinstance(config.pool, ArmPoolConfig)
+    assert isinstance(config.env, ArmConfig)
     measured = [record["types"][test_type] for _, record, _ in runs]
     folders = [results / "arms" / "runs" / name for name, _, _ in runs]
     means = [row["success_mean"] for row in measured]
@@ -109,6 +110,7 @@ def make_row(
         "test_type": test_type,
         "algorithm": name_algorithm(config),
         "encoding": config.encoding,
+        "joint_slots": config.env.joint_slots,
         "network": config.ddpg.network,
         "seeds": sorted(config.seed for _, _, config in runs),
         "success_mean": round(float(np.mean(means)), 2),

@@ -177,8 +177,13 @@ def source(published: Published, rows: Sequence[TableRow], name: str) -> tuple[s
 
 
 def name_inputs(row: TableRow) -> str:
-    """A policy's v_h, and its network where that is another than usual."""
-    return row.encoding if row.network == "flat" else f"{row.encoding}, network {row.network}"
+    """A policy's v_h, and where its joints stand and its network where those are other than usual."""
+    parts = [row.encoding]
+    if row.joint_slots != "packed":
+        parts.append(f"{row.joint_slots} joints")
+    if row.network != "flat":
+        parts.append(f"network {row.network}")
+    return ", ".join(parts)
 
 
 def letters(types: Iterable[str]) -> str:

@@ -24,7 +24,7 @@ from hcp_jax.reporting.curves import train_commands
 from hcp_jax.reporting.published import Published
 from hcp_jax.reporting.robots import arm_pose
 from hcp_jax.reporting.settings import LISTED, LISTED_COMMAND, SETTINGS, roman
-from hcp_jax.reporting.tables import letters
+from hcp_jax.reporting.tables import letters, name_inputs
 from hcp_jax.training import run_folder
 from hcp_jax.training.metrics import MetricsWriter
 
@@ -404,3 +404,9 @@ def test_committed_records_are_read_whole():
             name: values["success_mean"] for name, values in types.items()
         }
     assert not re.search(r"NaN|Infinity", (ROOT / "results" / "table1.json").read_text())
+
+
+def test_a_row_says_where_its_joints_stand_if_they_are_not_packed():
+    row = read_table(ROOT / "results" / "table1.json")[0]
+    rows = [dataclasses.replace(row, joint_slots=layout, network="flat") for layout in ("packed", "aligned")]
+    assert [name_inputs(row) for row in rows] == [row.encoding, f"{row.encoding}, aligned joints"]
