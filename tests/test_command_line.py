@@ -121,6 +121,14 @@ BAD_ARGUMENTS = {
         ["--config", REACHER, f"--config.init={POLICY}", "--config.ddpg.layer_norm=False"],
         "another architecture: its ddpg.layer_norm is True, the config's False",
     ),
+    "init with joints elsewhere": (
+        ["--config", REACHER, f"--config.init={POLICY}", "--config.env.joint_slots=aligned"],
+        "another architecture: its env.joint_slots is 'packed', the config's 'aligned'",
+    ),
+    "unknown places of joints": (
+        ["--config", REACHER, "--config.env.joint_slots=sorted"],
+        "env.joint_slots='sorted': expected one of packed, aligned",
+    ),
     "missing init": (["--config", HOPPER, "--config.init=nowhere"], "nowhere: no such run folder"),
     "resume of nothing": (["--config", HOPPER, "--resume"], "no such run folder"),
 }

@@ -47,7 +47,7 @@ def _architecture(config: Config) -> tuple[str, ...]:
         fields = ("ppo.hidden_sizes", "ppo.normalize_observation")
     else:
         names = ("network", "hidden_sizes", "layer_norm", "normalize_inputs", "double_critic")
-        fields = tuple(f"ddpg.{name}" for name in names)
+        fields = ("env.joint_slots", *(f"ddpg.{name}" for name in names))
     return (*fields, "embedding.size") if config.encoding == "embedding" else fields
 
 
