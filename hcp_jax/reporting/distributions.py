@@ -4,13 +4,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from hcp_jax.config import ArmConfig
 from hcp_jax.evaluation.appendix import PAPER_DAMPING
 from hcp_jax.evaluation.records import Evaluation, Outcome, naming, read_evaluation
 from hcp_jax.reporting.curves import make_curves
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import Spread, draw_spreads
 from hcp_jax.reporting.published import Published, Run
-from hcp_jax.reporting.settings import EVALUATE_COMMAND, RESULTS_COMMANDS, SETTINGS, TASKS, roman
+from hcp_jax.reporting.settings import EVALUATE_COMMAND, RESULTS_COMMANDS, SETTINGS, TASKS, name_inputs, roman
 from hcp_jax.reporting.tables import NOT_RUN, capitalise, decimals, difference, spread
 
 DISTANCE = "final distance [m]"
@@ -49,7 +50,9 @@ def make_distances(published: Published, task: str) -> Item:
             is_control = config.encoding.startswith("none+")
             number = setting.experiment + (config.encoding == "none")
             first = "control" if is_control else f"Exp. {roman(number)}"
-            inputs = "DDPG+HER" if config.encoding == "none" else config.encoding.replace("+", "+\n")
+            assert isinstance(config.env, ArmConfig)
+            inputs = name_inputs(config.encoding, config.env.joint_slots, config.ddpg.network)
+            inputs = "DDPG+HER" if config.encoding == "none" else inputs.replace("+", "+\n").replace(", ", ",\n")
             label = f"{first}\n{inputs}\nseed {config.seed}"
             spreads.append(spread_of(label, evaluation.encoding, outcome, outcome.final_distances))
             files.append(published.show(evaluation.path))

@@ -52,6 +52,12 @@ class Setting:
         return name.startswith(f"{self.prefix}_") and name.endswith(f"_leave_{self.left_out.lower()}")
 
 
+def name_inputs(encoding: str, joint_slots: str, network: str) -> str:
+    """A policy's v_h, and where its joints stand and its network where those are other than usual."""
+    joints = f", {joint_slots} joints" if joint_slots != "packed" else ""
+    return encoding + joints + (f", network {network}" if network != "flat" else "")
+
+
 def roman(experiment: int | None) -> str:
     return "" if experiment is None else ROMAN[experiment - 1]
 

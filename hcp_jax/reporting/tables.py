@@ -15,6 +15,7 @@ from hcp_jax.reporting.settings import (
     TABLES_COMMAND,
     TASKS,
     Setting,
+    name_inputs,
     roman,
 )
 
@@ -54,7 +55,7 @@ def make_table1(published: Published, rows: Sequence[TableRow]) -> Item:
             experiment = setting.experiment + number
             first = (roman(experiment), setting.left_out)
             measured = [row for row in rows if row.experiment == experiment]
-            lines[setting.task] += [Row((*first, row.algorithm, name_inputs(row), *measurements(row))) for row in measured]
+            lines[setting.task] += [Row((*first, row.algorithm, inputs_of(row), *measurements(row))) for row in measured]
             if not measured:
                 steps = describe_progress(published, name)
                 state = NOT_EVALUATED if steps else NOT_RUN
@@ -74,7 +75,7 @@ def make_controls(published: Published, rows: Sequence[TableRow]) -> Item:
     """Ours alone: what the end effector's position explains without any hardware."""
     columns = ("task", "tested on", "algorithm", "v_h", "ours [%]", "paper [%]", "difference", "trained on", *MEASUREMENTS)
     lines = tuple(
-        Row((row.task.replace("_", " "), row.test_type, row.algorithm, name_inputs(row), *measurements(row)))
+        Row((row.task.replace("_", " "), row.test_type, row.algorithm, inputs_of(row), *measurements(row)))
         for row in rows
         if row.experiment is None
     )
@@ -124,7 +125,7 @@ def types_of_experiment(rows: Sequence[TableRow], setting: Setting, experiment: 
     lines = [Row((roman(experiment), algorithm, "", "paper", *shown), "paper")]
     for policies in dict.fromkeys(row.policy for row in measured):
         ours = {row.test_type: row for row in measured if row.policy == policies}
-        first = (roman(experiment), algorithm, name_inputs(next(iter(ours.values()))))
+        first = (roman(experiment), algorithm, inputs_of(next(iter(ours.values()))))
         cells, differences = [], []
         for letter in PAPER_TYPES:
             row = ours.get(letter)
@@ -147,7 +148,7 @@ def make_other_arms(published: Published, rows: Sequence[TableRow]) -> Item:
         measured = [row for row in rows if row.test_type == letter]
         for row in measured:
             ours, paper, points, _, seeds = measurements(row)[:5]
-            cells = (row.algorithm, name_inputs(row), letter, ours, paper, points, seeds, ", ".join(row.policy))
+            cells = (row.algorithm, inputs_of(row), letter, ours, paper, points, seeds, ", ".join(row.policy))
             lines.append(Row((roman(row.experiment), *cells)))
         for (experiment, of_type), paper in PAPER_OTHER_ARMS.items():
             if of_type == letter and not any(row.experiment == experiment for row in measured):
@@ -176,14 +177,8 @@ def source(published: Published, rows: Sequence[TableRow], name: str) -> tuple[s
     return (published.show(published.folder / name),) if rows else ()
 
 
-def name_inputs(row: TableRow) -> str:
-    """A policy's v_h, and where its joints stand and its network where those are other than usual."""
-    parts = [row.encoding]
-    if row.joint_slots != "packed":
-        parts.append(f"{row.joint_slots} joints")
-    if row.network != "flat":
-        parts.append(f"network {row.network}")
-    return ", ".join(parts)
+def inputs_of(row: TableRow) -> str:
+    return name_inputs(row.encoding, row.joint_slots, row.network)
 
 
 def letters(types: Iterable[str]) -> str:
