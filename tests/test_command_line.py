@@ -131,6 +131,9 @@ BAD_ARGUMENTS = {
     ),
     "missing init": (["--config", HOPPER, "--config.init=nowhere"], "nowhere: no such run folder"),
     "resume of nothing": (["--config", HOPPER, "--resume"], "no such run folder"),
+    "resume of no folder": (["--resume", "--out", "nowhere"], "nowhere: no such run folder"),
+    "resume of what": (["--resume"], "required: --config, unless --resume --out FOLDER"),
+    "out without config": (["--out", "a"], "required: --config"),
 }
 
 

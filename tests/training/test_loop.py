@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from hcp_jax import train
 from hcp_jax.algorithms.ppo import get_actor
 from hcp_jax.config import to_dict
 from hcp_jax.evaluation.summary import read_wall_seconds
@@ -128,9 +129,9 @@ def test_signals_are_what_they_were_once_training_ends(finished_run, tiny_config
     assert [signal.getsignal(name) for name in (signal.SIGINT, signal.SIGTERM)] == before
 
 
-def test_a_longer_run_may_continue_a_shorter_one(finished_run, tiny_config, tmp_path):
+def test_a_run_goes_on_from_its_folder_alone_and_may_be_given_more_steps(finished_run, tmp_path):
     folder = shutil.copytree(finished_run, tmp_path / "run")
-    loop.train(dataclasses.replace(tiny_config, total_env_steps=640), folder, resume=True)
+    train.main(["--resume", "--out", str(folder), "--config.total_env_steps=640"])
     assert [int(row["env_steps"]) for row in metrics(folder)] == [128, 256, 384, 512, 640]
 
 
