@@ -12,7 +12,9 @@ from hcp_jax.training import loop, run_folder
 
 def main(arguments: list[str] | None = None) -> None:
     parser = command_line.OneLineParser(prog="hcp_jax.train", description="Trains one policy for a pool of robots.")
-    parser.add_argument("--config", help="experiment file; it is Python and will be executed. Not needed to --resume --out FOLDER")
+    parser.add_argument(
+        "--config", help="experiment file; it is Python and will be executed. Not needed to --resume --out FOLDER"
+    )
     parser.add_argument("--out", type=pathlib.Path, help="run folder (default: runs/NAME)")
     parser.add_argument("--resume", action="store_true", help="go on from the run folder's newest checkpoint")
     parser.add_argument("--distributed", action="store_true", help="trains together with other processes")

@@ -175,6 +175,45 @@ def _outcome(values: dict) -> Outcome:
     )
 
 
+@dataclasses.dataclass(frozen=True)
+class Rehearsed:
+    """What a policy reached on one arm under one of the conditions: success [%], final distances [N] m."""
+
+    success: float
+    final_distances: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class Rehearsal:
+    """A record that `rehearse --json` wrote."""
+
+    path: pathlib.Path
+    policy: str
+    robot: str
+    encoding: str
+    conditions: Mapping[str, Rehearsed]
+
+
+def read_rehearsal(path: pathlib.Path) -> Rehearsal:
+    """Raises RecordError if the file is damaged or no rehearsal."""
+    record = read_json(path, dict)
+    with naming(path):
+        return Rehearsal(
+            path=path,
+            policy=pathlib.PurePath(record["run"]).name,
+            robot=str(record["robot"]),
+            encoding=str(record["encoding"]),
+            conditions={name: _rehearsed(values) for name, values in record["conditions"].items()},
+        )
+
+
+def _rehearsed(values: dict) -> Rehearsed:
+    distances = np.asarray([number(trial["final_distance"]) for trial in values["trials"]])
+    if not len(distances):
+        raise ValueError("it has no trials")
+    return Rehearsed(number(values["success"]), distances)
+
+
 def _numbers(values: list | None) -> np.ndarray | None:
     """[N] numbers, None if there are none."""
     return np.asarray([number(value) for value in values]) if values else None

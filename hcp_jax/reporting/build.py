@@ -9,6 +9,7 @@ from hcp_jax.reporting.distributions import damping_section, distance_section
 from hcp_jax.reporting.hoppers import hopper_section
 from hcp_jax.reporting.page import GENERATOR, Figure, Item, Section, write_page
 from hcp_jax.reporting.published import Published
+from hcp_jax.reporting.rehearsals import rehearsal_section
 from hcp_jax.reporting.robots import describe_arm, draw_arm, draw_hopper
 from hcp_jax.reporting.tables import table_sections
 
@@ -37,7 +38,8 @@ def build_report(results: pathlib.Path) -> tuple[str, list[str]]:
     table1, types = table_sections(published)
     curves, finetuning, *of_type_i = curve_sections(published)
     distances, damping, hopper = distance_section(published), damping_section(published), hopper_section(published)
-    sections = (robot_section(), table1, types, curves, distances, finetuning, *of_type_i, damping, hopper)
+    rehearsal = rehearsal_section(published)
+    sections = (robot_section(), table1, types, curves, distances, rehearsal, finetuning, *of_type_i, damping, hopper)
     return write_page(TITLE, INTRODUCTION, sections), published.missing
 
 

@@ -236,6 +236,11 @@ def results(tiny_arms, tiny_config, tmp_path_factory) -> pathlib.Path:
         sets = {"train": 100.0, "heldout": 10.0, "heldout_first_50": 40.0 + 20.0 * seed}
         record = {"sets": {name: {"return_mean": mean} for name, mean in sets.items()}}
         write_json(folder / "hopper" / "evaluations" / f"hopper_hcpi_s{seed}_first_steps.json", record)
+    for name, distances in (("reacher_hcpe_leave_h", (0.01, 0.3)), ("reacher_sawyer", (0.01, 0.02))):
+        trials = [{"final_distance": distance} for distance in distances]
+        record = {"run": f"results/policies/{name}_s0", "robot": "sawyer", "encoding": "chain_fk"}
+        conditions = {"ideal": {"success": 100.0, "trials": trials}, "real": {"success": 50.0, "trials": trials}}
+        write_json(folder / "rehearsal" / f"{name}_s0_sawyer.json", record | {"conditions": conditions})
     return folder
 
 
@@ -252,6 +257,15 @@ def test_the_stress_test_stands_beside_the_papers(tiny):
     assert shown["2 to 10"] == ("not run", "100.00", "")
     assert len(rows) == len(PAPER_DAMPING)
     assert any("Violins" in alt for alt in tiny.pictures["damping"])
+
+
+def test_the_rehearsed_sawyer_stands_beside_the_papers_real_one(tiny):
+    a, c = tiny.rows("rehearsal", "Success [%] under each condition alone, and under all (real)")
+    assert (a["policy"], c["policy"]) == ("A reacher_hcpe_leave_h_s0", "C reacher_sawyer_s0")
+    assert (a["ideal"], a["real"], a["difference"]) == ("100.00", "50.00", "\N{MINUS SIGN}25.00")
+    assert (a["median distance, real [m]"], c["median distance, real [m]"]) == ("0.155", "0.015")
+    assert (c["real"], c["paper, real arm"], c["difference"]) == ("50.00", "", "")
+    assert "Violins" in tiny.pictures["rehearsal"][0]
 
 
 def test_what_first_steps_tell_is_averaged_over_seeds(tiny):
@@ -327,6 +341,16 @@ DAMAGED = {
         "hopper/runs/hopper_none_s0/metrics.csv",
         "a,train_return_mean\n1,2\n",
         "no field 'env_steps'",
+    ),
+    "a rehearsal without goals": (
+        "rehearsal/reacher_sawyer_s0_sawyer.json",
+        json.dumps({"run": "a", "robot": "b", "encoding": "none", "conditions": {"real": {"success": 1.0, "trials": []}}}),
+        "no trials",
+    ),
+    "a rehearsal of other conditions": (
+        "rehearsal/reacher_sawyer_s0_sawyer.json",
+        json.dumps({"run": "a", "robot": "b", "encoding": "none", "conditions": {}}),
+        "no field 'real'",
     ),
     "summary": ("hopper/summary.json", '[{"algorithm": "PPO"}]', "no field"),
     "finetune": ("hopper/finetune.json", '[{"run": "a"}]', "no field"),
