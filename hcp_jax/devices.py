@@ -115,6 +115,12 @@ def replicate(tree: Any) -> Any:
     return jax.tree.map(put, tree)
 
 
+def shapes_of(make: Callable[[], Any]) -> Any:
+    """Shapes and types of the arrays that `make` would give, each on every device, without computing them."""
+    sharding = NamedSharding(get_mesh(), EVERYWHERE)
+    return jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(leaf.shape, leaf.dtype, sharding=sharding), jax.eval_shape(make))
+
+
 def gather(tree: Any) -> Any:
     """Arrays that may be split over processes, whole and on a device of this one. Every process must call it."""
     if jax.process_count() == 1:

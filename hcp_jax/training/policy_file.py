@@ -7,6 +7,7 @@ import flax.serialization
 import jax
 import numpy as np
 
+from hcp_jax.devices import shapes_of
 from hcp_jax.experiment.base import Experiment, TrainingState
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import CheckpointError, Checkpoints, check_architecture, leaf_name
@@ -23,7 +24,7 @@ def write_policy(folder: pathlib.Path, state: TrainingState) -> pathlib.Path:
 
 
 def read_policy(folder: pathlib.Path, template: TrainingState) -> TrainingState:
-    """`template` with the policy put in.
+    """`template`, a state of arrays or of their shapes, with the policy put in.
 
     Raises:
         CheckpointError: the file is damaged, or of another architecture than `template`.
@@ -42,23 +43,30 @@ def read_policy(folder: pathlib.Path, template: TrainingState) -> TrainingState:
 
 
 def load_policy(folder: pathlib.Path, run: Experiment, best: bool = False) -> tuple[int, Any]:
-    """An initial state with the newest readable policy of a run folder, or its best one, and its number of iterations.
+    """The newest readable policy of a run folder, or its best one, and its number of iterations.
 
-    A folder may also be a published policy: one with `policy.msgpack` instead of checkpoints. Raises CheckpointError.
+    A folder may also be a published policy: one with `policy.msgpack` instead of checkpoints.
+
+    Returns:
+        iterations, and a state whose `policy_fields` hold the policy; its other fields hold the shapes of arrays.
+
+    Raises:
+        CheckpointError: there is no policy, it cannot be read, or it is of another architecture.
     """
+    template = shapes_of(run.init_state)
     checkpoint_folder = folder / run_folder.CHECKPOINT_FOLDER
     if not checkpoint_folder.is_dir():
         if (folder / POLICY_FILE).exists():
             if best:
                 raise CheckpointError(f"--best: {folder} is a published policy, which is one alone")
-            state = read_policy(folder, run.init_state())
+            state = read_policy(folder, template)
             return int(state.iteration), state
         raise CheckpointError(f"{folder}: holds no checkpoint")
     checkpoints = Checkpoints(checkpoint_folder, read_only=True)
     try:
         if best:
-            return checkpoints.restore_best(run.init_state())
-        iteration, state, skipped = checkpoints.restore(run.init_state(), policy_only=True)
+            return checkpoints.restore_best(template)
+        iteration, state, skipped = checkpoints.restore(template, policy_only=True)
         for line in skipped:
             print(line, flush=True)
         return iteration, state
