@@ -1,0 +1,33 @@
+"""Exp. I with 10 to 2,900 training arms of each type, at equal steps: what more robots bring to robots never seen (not in the
+paper). 2,900 of each of eight types are as many arms as the run has episodes. Preset: fast with small batches, aligned joints.
+
+`python -m hcp_jax.sweep experiments/pool_sizes.py --summary results/ablations/pool_sizes.json`
+"""
+
+import dataclasses
+
+from hcp_jax import presets
+from hcp_jax.config import Config
+
+ROBOTS_PER_TYPE = (10, 40, 140, 560, 2900)
+
+
+def get_configs() -> list[Config]:
+    config = presets.arm(
+        "reacher_pool",
+        "reacher",
+        "chain_fk",
+        left_out="H",
+        joint_slots="aligned",
+        total_env_steps=2_304_000,
+        eval_every=384_000,
+        ddpg=dataclasses.replace(presets.FAST_DDPG, **presets.SMALL_BATCHES),
+    )
+    return [
+        dataclasses.replace(
+            config,
+            name=f"reacher_pool_{number}",
+            pool=dataclasses.replace(config.pool, robots_per_type=number, heldout_per_type=100),
+        )
+        for number in ROBOTS_PER_TYPE
+    ]
