@@ -131,8 +131,6 @@ BAD_ARGUMENTS = {
     ),
     "missing init": (["--config", HOPPER, "--config.init=nowhere"], "nowhere: no such run folder"),
     "resume of nothing": (["--config", HOPPER, "--resume"], "no such run folder"),
-    "resume of no folder": (["--resume", "--out", "nowhere"], "nowhere: no such run folder"),
-    "resume of what": (["--resume"], "required: --config, unless --resume --out FOLDER"),
     "out without config": (["--out", "a"], "required: --config"),
 }
 
@@ -246,6 +244,21 @@ def test_resuming_with_another_setting_names_it(finished_run, tiny_config, tmp_p
     path = tiny_experiment(tmp_path, tiny_config)
     line = fails(capsys, train.main, ["--config", path, "--out", str(finished_run), "--resume", "--config.seed=4"])
     assert "seed=0, not 4" in line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--resume"], "required: --config, unless --resume --out FOLDER"),
+        (["--resume", "--out", "nowhere"], "nowhere: no such run folder"),
+        (["--resume", "--out", str(POLICY)], "is a published policy; start a new run from it with --config.init="),
+    ],
+)
+def test_resuming_what_is_no_run_is_refused(arguments, expected, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    before = sorted(POLICY.iterdir())
+    assert expected in fails(capsys, train.main, arguments)
+    assert (sorted(POLICY.iterdir()), list(tmp_path.iterdir())) == (before, [])
 
 
 def test_resuming_an_empty_folder_is_refused(tiny_config, tmp_path, capsys):

@@ -148,6 +148,10 @@ class GoalEnv:
         )
         return next_state, transition
 
+    def action_mask(self, index: jax.Array) -> jax.Array:
+        """1 for the entries of actions that robots at `index` [B] have a joint for, else 0: [B, A]."""
+        return self._slots.to_entries(self._joint_mask[index], index)
+
     def _start_near_goal(
         self, key: jax.Array, index: jax.Array, qpos: jax.Array, desired_goal: jax.Array
     ) -> tuple[jax.Array, jax.Array]:

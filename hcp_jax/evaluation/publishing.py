@@ -5,12 +5,13 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
 
+from hcp_jax.config import ConfigError
 from hcp_jax.evaluation.summary import average_curves, read_curve
 from hcp_jax.experiment.base import TrainingState
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE
 from hcp_jax.training.policy_file import load_policy, write_policy
-from hcp_jax.training.run_folder import CONFIG_FILE, ENVIRONMENT_FILE, read_config
+from hcp_jax.training.run_folder import CONFIG_FILE, ENVIRONMENT_FILE, find_differences, read_config
 
 _FILES = (CONFIG_FILE, ENVIRONMENT_FILE, TIMING_FILE, METRICS_FILE)  # of a run, the one last that makes it one to be found
 
@@ -27,13 +28,28 @@ def publish_runs(folders: Sequence[pathlib.Path], out: pathlib.Path, policies: p
 
     Returns:
         all folders of `out/runs`, those of earlier calls too: what tables and curves are made of.
+
+    Raises:
+        ConfigError: a policy of that name is published that was trained with other settings; nothing is written.
     """
+    for folder in folders:
+        _check_replaceable(folder, policies / folder.name)
     read = [(folder.name, *_read_run(folder)) for folder in folders]
     for name, files, state in read:
         _write_files(policies / name, {key: files[key] for key in (CONFIG_FILE, ENVIRONMENT_FILE)})
         write_policy(policies / name, state)
         _write_files(out / "runs" / name, files)
     return find_runs(out / "runs")
+
+
+def _check_replaceable(folder: pathlib.Path, published: pathlib.Path) -> None:
+    """Raises ConfigError if another run than `folder` is published under its name."""
+    differences = find_differences(read_config(published), read_config(folder)) if published.exists() else []
+    if differences:
+        name, old, new = differences[0]
+        raise ConfigError(
+            f"{folder}: its {name} is {new!r}, and {old!r} in {published}, which it would replace; name it otherwise"
+        )
 
 
 def describe_published(folders: Sequence[pathlib.Path], out: pathlib.Path, policies: pathlib.Path) -> str:

@@ -12,13 +12,11 @@ from hcp_jax.experiment.base import Experiment, TrainingState
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import CheckpointError, Checkpoints, check_architecture, leaf_name
 
-POLICY_FILE = "policy.msgpack"
-
 
 def write_policy(folder: pathlib.Path, state: TrainingState) -> pathlib.Path:
     """Writes `policy.msgpack`: networks, embedding and statistics, float32. Returns its path."""
     content = flax.serialization.to_state_dict({name: getattr(state, name) for name in state.policy_fields})
-    path = folder / POLICY_FILE
+    path = folder / run_folder.POLICY_FILE
     path.write_bytes(flax.serialization.msgpack_serialize(jax.device_get(content)))
     return path
 
@@ -29,7 +27,7 @@ def read_policy(folder: pathlib.Path, template: TrainingState) -> TrainingState:
     Raises:
         CheckpointError: the file is damaged, or of another architecture than `template`.
     """
-    path = folder / POLICY_FILE
+    path = folder / run_folder.POLICY_FILE
     try:
         content = flax.serialization.msgpack_restore(path.read_bytes())
         fields = {name: content[name] for name in template.policy_fields}
@@ -56,7 +54,7 @@ def load_policy(folder: pathlib.Path, run: Experiment, best: bool = False) -> tu
     template = shapes_of(run.init_state)
     checkpoint_folder = folder / run_folder.CHECKPOINT_FOLDER
     if not checkpoint_folder.is_dir():
-        if (folder / POLICY_FILE).exists():
+        if (folder / run_folder.POLICY_FILE).exists():
             if best:
                 raise CheckpointError(f"--best: {folder} is a published policy, which is one alone")
             state = read_policy(folder, template)

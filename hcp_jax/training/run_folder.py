@@ -20,6 +20,7 @@ from hcp_jax.errors import UserError
 CONFIG_FILE = "config.json"
 ENVIRONMENT_FILE = "environment.json"
 CHECKPOINT_FOLDER = "checkpoints"
+POLICY_FILE = "policy.msgpack"  # of a published policy, which has no checkpoints
 LOCK_FILE = ".lock"
 # Fields that a resumed run may change.
 _CHANGEABLE = {"total_env_steps", "keep_checkpoints"}
@@ -37,12 +38,19 @@ def check_new(folder: pathlib.Path) -> None:
 
 
 def check_resumable(folder: pathlib.Path, config: Config) -> None:
-    """Raises RunFolderError unless `folder` holds a run of this config (fields in `_CHANGEABLE` aside)."""
+    """Raises RunFolderError unless `folder` holds a run, not a published policy, of this config (`_CHANGEABLE` aside)."""
     saved = read_config(folder)
-    old, new = _flatten(to_dict(saved)), _flatten(to_dict(config))
-    for name in new:
-        if name not in _CHANGEABLE and old[name] != new[name]:
-            raise RunFolderError(f"--resume: {folder} was started with {name}={old[name]!r}, not {new[name]!r}")
+    if (folder / POLICY_FILE).exists():
+        raise RunFolderError(f"--resume: {folder} is a published policy; start a new run from it with --config.init={folder}")
+    for name, old, new in find_differences(saved, config):
+        if name not in _CHANGEABLE:
+            raise RunFolderError(f"--resume: {folder} was started with {name}={old!r}, not {new!r}")
+
+
+def find_differences(one: Config, other: Config) -> list[tuple[str, object, object]]:
+    """Dotted names of the fields in which two configs differ, with both values; None is that of a field which one lacks."""
+    old, new = _flatten(to_dict(one)), _flatten(to_dict(other))
+    return [(name, old.get(name), new.get(name)) for name in old | new if old.get(name) != new.get(name)]
 
 
 @contextlib.contextmanager

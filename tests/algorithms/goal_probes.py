@@ -38,6 +38,9 @@ class PlaneEnv:
         state = state.replace(physics=state.physics + 1, obs=position, achieved_goal=position)
         return state, GoalTransition(action, reward, success, distance, diverged, jnp.int32(0))
 
+    def action_mask(self, index):
+        return jnp.ones((*index.shape, 2))
+
     def compute_reward(self, achieved_goal, desired_goal, action):
         success = jnp.linalg.norm(achieved_goal - desired_goal, axis=-1) < REACH
         return jnp.where(success, 1.0, -1.0) - 0.05 * jnp.sum(jnp.square(action), axis=-1), success

@@ -161,6 +161,24 @@ def test_the_target_takes_the_smaller_value_of_two_critics():
     assert abs(loss(-1.0, 5.0) - loss(5.0, 5.0)) > 1.0
 
 
+def test_what_the_actor_says_of_a_missing_joint_changes_nothing(monkeypatch):
+    learner = make(warmup_episodes=1000)
+    monkeypatch.setattr(learner.env, "action_mask", lambda index: jnp.broadcast_to(jnp.asarray([1.0, 0.0]), (*index.shape, 2)))
+    state = trained(learner, 2)
+    sample = sample_steps(state.replay, jax.random.key(1), 64)
+
+    def loss(bias: jax.Array) -> jax.Array:
+        """Both losses with `bias` [2] added to what actor and target actor say."""
+        shifted = [jax.tree.map(jnp.copy, params["actor"]) for params in (state.params, state.target_params)]
+        for actor in shifted:
+            actor["params"]["output"]["bias"] += bias
+        params, target = (old | {"actor": new} for old, new in zip((state.params, state.target_params), shifted, strict=True))
+        return learner._loss(params, target, state.statistics, sample, sample.achieved_goal[:, 0] + 1.0)[0]
+
+    here, missing = jnp.asarray([0.5, 0.0]), jnp.asarray([0.0, 0.5])
+    assert loss(missing) == loss(jnp.zeros(2)) != loss(here)
+
+
 def test_the_policy_is_a_running_mean_of_the_actors():
     plain, averaged = trained(make(), 3), trained(make(actor_average=0.75), 3)
     before, after = (trained(make(actor_average=0.75), number) for number in (3, 4))
@@ -173,7 +191,8 @@ def test_the_policy_is_a_running_mean_of_the_actors():
 
 def test_an_input_that_never_varied_in_training_is_not_seen_by_the_networks():
     learner = make(normalize_inputs=True)
-    inputs = jax.random.normal(jax.random.key(0), (500, learner.conditioning.size)).at[:, 0].set(0.3)
+    rounding = 1e-5 * jax.random.normal(jax.random.key(1), (500,))
+    inputs = jax.random.normal(jax.random.key(0), (500, learner.conditioning.size)).at[:, 0].set(0.3 + rounding)
     statistics = running_statistics.update(learner.init(jax.random.key(0)).statistics, inputs)
     seen, of_another_robot = (learner.normalize(x, statistics) for x in (inputs, inputs.at[:, 0].set(0.4)))
     np.testing.assert_array_equal(seen, of_another_robot)

@@ -112,6 +112,7 @@ def test_aligned_joints_move_as_packed_ones_do_and_stand_at_their_types_entries(
     spread = packed.at[:2].set(5.0).at[:2, jnp.array(of_type_a)].set(packed[:2, :5])
     _, expected, expected_transition = play(reacher, key, packed)
     _, after, transition = play(aligned, key, spread)
+    np.testing.assert_array_equal(transition.action, jnp.clip(spread, -1.0, 1.0) * aligned.action_mask(jnp.arange(4)))
     np.testing.assert_array_equal(after.physics.qpos, expected.physics.qpos)
     np.testing.assert_allclose(transition.reward, expected_transition.reward, rtol=1e-6)
     for entries, joints in (

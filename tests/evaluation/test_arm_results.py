@@ -89,3 +89,15 @@ def test_a_run_that_is_collected_later_is_added_to_those_before(results, finishe
     collect.main([str(tmp_path / "runs"), "--out", str(tmp_path / "results")])
     (row,) = json.loads((tmp_path / "results" / "arms" / "summary.json").read_text())
     assert row["seeds"] == [0, 1]
+
+
+def test_a_run_of_other_settings_does_not_replace_a_published_one(results, finished_arms, tmp_path, capsys):
+    shutil.copytree(finished_arms, tmp_path / "runs" / "arms_s0")
+    config = json.loads((finished_arms / "config.json").read_text()) | {"total_env_steps": 80}
+    (tmp_path / "runs" / "arms_s0" / "config.json").write_text(json.dumps(config))
+    before = {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
+    with pytest.raises(SystemExit) as exit_info:
+        collect.main([str(tmp_path / "runs"), "--out", str(results)])
+    assert exit_info.value.code == 2
+    assert "its total_env_steps is 80, and 320 in" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in results.rglob("*") if path.is_file()} == before
