@@ -1,5 +1,5 @@
-"""Exp. I with 10 to 2,900 training arms of each type, at equal steps: what more robots bring to robots never seen (not in the
-paper). 2,900 of each of eight types are as many arms as the run has episodes. Preset: fast with small batches, aligned joints.
+"""Exp. I with 10 to 1,440 training arms of each type, at equal steps: what more robots bring to robots never seen (not in the
+paper). 1,440 of each of eight types are as many arms as the run has episodes. Preset: fast with small batches, aligned joints.
 
 `python -m hcp_jax.sweep experiments/pool_sizes.py --summary results/ablations/pool_sizes.json`
 """
@@ -9,7 +9,7 @@ import dataclasses
 from hcp_jax import presets
 from hcp_jax.config import Config
 
-ROBOTS_PER_TYPE = (10, 40, 140, 560, 2900)
+ROBOTS_PER_TYPE = (10, 40, 140, 560, 1440)
 
 
 def get_configs() -> list[Config]:

@@ -14,7 +14,7 @@ import jax
 from absl import flags
 from ml_collections import ConfigDict, config_flags
 
-from hcp_jax.config import Config, ConfigError, field_names, from_dict, to_dict, unknown_field
+from hcp_jax.config import MAX_SEED, Config, ConfigError, field_names, from_dict, to_dict, unknown_field
 from hcp_jax.errors import NonFiniteError, PhysicsOverflowError, UserError, one_line
 from hcp_jax.hardware.catalogue import catalogue_names
 from hcp_jax.physics.base import INTEGRATORS, PHYSICS
@@ -61,6 +61,13 @@ def output_file(word: str) -> pathlib.Path:
     except OSError as error:
         raise argparse.ArgumentTypeError(f"{word}: cannot be written ({error.strerror})") from error
     return path
+
+
+def seed(word: str) -> int:
+    """A seed on the command line."""
+    if not word.isdecimal() or int(word) > MAX_SEED:
+        raise argparse.ArgumentTypeError(f"{word}: expected a whole number from 0 to {MAX_SEED}")
+    return int(word)
 
 
 def add_chain_options(parser: argparse.ArgumentParser) -> None:

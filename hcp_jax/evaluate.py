@@ -42,7 +42,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--pool", type=pathlib.Path, help="take the new robots from a folder that RobotPool.save wrote")
     parser.add_argument("--robot", help=command_line.OWN_ARM)
     command_line.add_chain_options(parser)
-    parser.add_argument("--seed", type=int, default=0, help="seed of the initial states")
+    parser.add_argument("--seed", type=command_line.seed, default=0, help="seed of the initial states")
     parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
     parser.add_argument("--json", type=command_line.output_file, help="file to write the whole record to")
     parser.add_argument("--without-robots", action="store_true", help="leave the rows of single robots out of that file")

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from hcp_jax.config import Config, to_dict
-from hcp_jax.errors import one_line
+from hcp_jax.errors import UserError, one_line
 
 LOCAL = "local"
 MAX_RETRIES = 3
@@ -26,9 +26,14 @@ def run_on_ray(jobs: Sequence[Job], run: Run, address: str, cpus_per_run: int) -
 
     Yields:
         each job that ended, with what it failed with after `MAX_RETRIES` more tries, or None.
-    """
-    import ray
 
+    Raises:
+        UserError: Ray is not installed.
+    """
+    try:
+        import ray
+    except ImportError as error:
+        raise UserError("--ray: needs the extra ray: pip install ray") from error
     ray.init(address=None if address == LOCAL else address, include_dashboard=False, log_to_driver=True)
     try:
         # Only a worker's death is tried again: bad input stays bad.

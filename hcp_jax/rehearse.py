@@ -24,7 +24,7 @@ def main(arguments: list[str] | None = None) -> None:
     )
     command_line.add_chain_options(parser)
     parser.add_argument("--goals", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=0, help="seed of goals, start poses, noise and jitter")
+    parser.add_argument("--seed", type=command_line.seed, default=0, help="seed of goals, start poses, noise and jitter")
     parser.add_argument("--json", type=command_line.output_file, help="file to write the whole record to")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():

@@ -25,7 +25,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--out", type=pathlib.Path, required=True, help=".mp4, .gif, or .png for a few pictures in a row")
     parser.add_argument("--pictures", type=int, default=5, help="of each robot in a .png; 1 shows the ends of the episodes")
     command_line.add_physics_option(parser)
-    parser.add_argument("--seed", type=int, default=0, help="seed of start poses, goals and noise")
+    parser.add_argument("--seed", type=command_line.seed, default=0, help="seed of start poses, goals and noise")
     parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():

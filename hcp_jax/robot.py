@@ -98,7 +98,8 @@ def print_record(record: dict) -> None:
     outside = [entry for entry in record["entries"] if not entry["is_inside"]]
     console.print(f"outside the training arms' ranges: {len(outside)} of {len(record['entries'])} entries")
     for entry in outside:
-        console.print(f"  {entry['name']}: {entry['value']:.4g}, trained on {entry['low']:.4g} to {entry['high']:.4g}")
+        trained = "none that has it" if entry["low"] is None else f"{entry['low']:.4g} to {entry['high']:.4g}"
+        console.print(f"  {entry['name']}: {entry['value']:.4g}, trained on {trained}")
 
 
 if __name__ == "__main__":

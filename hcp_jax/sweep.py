@@ -8,6 +8,7 @@ import sys
 
 from hcp_jax import command_line
 from hcp_jax.config import Config, ConfigError, from_dict
+from hcp_jax.errors import NonFiniteError, PhysicsOverflowError, one_line
 from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.summary import summarise_runs
 from hcp_jax.ray_sweep import Job, run_on_ray
@@ -31,6 +32,8 @@ def main(arguments: list[str] | None = None) -> None:
     with command_line.user_errors_end_the_command():
         if known.seeds < 1:
             raise ConfigError(f"--seeds={known.seeds}: expected at least 1")
+        if any(word.startswith("--config.seed") for word in overrides):
+            raise ConfigError("--config.seed: a sweep has seeds 0 to SEEDS-1; expected --seeds")
         configs = [command_line.apply_overrides(config, overrides) for config in command_line.load_configs(known.list)]
         command_line.enable_compilation_cache()
         out = known.out or pathlib.Path("runs") / pathlib.Path(known.list).stem
@@ -39,14 +42,35 @@ def main(arguments: list[str] | None = None) -> None:
             for seed in range(known.seeds)
             for config in configs
         ]
+        check_jobs(jobs)
         run_all = run_here if known.ray is None else functools.partial(run_there, address=known.ray, cpus=known.cpus_per_run)
         if run_all(jobs):
             write_json(known.summary or out / "summary.json", summarise_runs([folder for _, folder in jobs]))
 
 
+def check_jobs(jobs: list[Job]) -> None:
+    """Raises ConfigError or RunFolderError where two runs would share a folder, or a folder holds a run of other settings."""
+    folders = [folder for _, folder in jobs]
+    for config, folder in jobs:
+        if folders.count(folder) > 1:
+            raise ConfigError(f"name={config.name!r}: two experiments of the list have this name, and would share {folder}")
+        if (folder / run_folder.CONFIG_FILE).exists():
+            run_folder.check_resumable(folder, config)
+
+
 def run_here(jobs: list[Job]) -> bool:
-    """Runs one after the other. Returns whether all are done; False if the user interrupted one."""
-    return not any(run_experiment(config, folder) for config, folder in jobs)
+    """Runs one after the other. Returns whether all are done; False if the user interrupted one. Ends the command as
+    `run_there` does."""
+    failed = []
+    for config, folder in jobs:
+        try:
+            if run_experiment(config, folder):
+                return False
+        except (PhysicsOverflowError, NonFiniteError) as error:
+            print(f"{folder}: {one_line(error)}", flush=True)
+            failed.append(folder)
+    end_if_failed(failed, jobs)
+    return True
 
 
 def run_there(jobs: list[Job], address: str, cpus: int) -> bool:
@@ -55,22 +79,28 @@ def run_there(jobs: list[Job], address: str, cpus: int) -> bool:
     for (_, folder), error in run_on_ray(jobs, run_in_worker, address, cpus):
         print(f"{folder}: {error or 'done'}", flush=True)
         failed += [folder] if error else []
-    if failed:
-        print(f"{len(failed)} of {len(jobs)} runs failed: {', '.join(map(str, failed))}", file=sys.stderr)
-        sys.exit(command_line.BROKEN)
+    end_if_failed(failed, jobs)
     return True
 
 
+def end_if_failed(failed: list[pathlib.Path], jobs: list[Job]) -> None:
+    """Ends the command with exit code 1 if there are failed runs."""
+    if failed:
+        print(f"{len(failed)} of {len(jobs)} runs failed: {', '.join(map(str, failed))}", file=sys.stderr)
+        sys.exit(command_line.BROKEN)
+
+
 def run_in_worker(config: dict, folder: str) -> None:
+    """Raises RuntimeError if the run was interrupted: it is not done."""
     command_line.enable_compilation_cache()
-    run_experiment(from_dict(Config, config), pathlib.Path(folder))
+    if run_experiment(from_dict(Config, config), pathlib.Path(folder)):
+        raise RuntimeError("interrupted; saved")
 
 
 def run_experiment(config: Config, folder: pathlib.Path) -> bool:
     """Trains, resumes or skips one experiment. Returns whether the user interrupted it."""
     resume = (folder / run_folder.CONFIG_FILE).exists()
     if resume:
-        run_folder.check_resumable(folder, config)
         iterations = latest_iteration(folder / run_folder.CHECKPOINT_FOLDER) or 0
         if iterations * config.batch_size >= config.total_env_steps:
             print(f"{folder}: done", flush=True)

@@ -9,6 +9,7 @@ import pytest
 
 from hcp_jax import benchmark, command_line, evaluate, sweep, train
 from hcp_jax.config import Config, ConfigError, field_names, from_dict, to_dict
+from hcp_jax.errors import PhysicsOverflowError
 
 EXPERIMENTS = pathlib.Path(__file__).resolve().parents[1] / "experiments"
 HOPPER = str(EXPERIMENTS / "hopper_ppo.py")
@@ -210,6 +211,31 @@ def test_a_sweep_refuses_no_seeds_and_a_folder_of_another_setting(finished_run, 
     shutil.copytree(finished_run, tmp_path / "runs" / "tiny_s0")
     line = fails(capsys, sweep.main, [*arguments, "--config.ppo.gamma=0.5"])
     assert "tiny_s0 was started with ppo.gamma=0.99, not 0.5" in line
+    assert "--config.seed: a sweep has seeds" in fails(capsys, sweep.main, [*arguments, "--config.seed=3"])
+    path.write_text(path.read_text().replace("[get_config()]", "[get_config()] * 2"))
+    assert "two experiments of the list have this name" in fails(capsys, sweep.main, arguments)
+
+
+def test_a_run_that_breaks_does_not_keep_a_sweep_from_the_others(tiny_config, tmp_path, capsys, monkeypatch):
+    def run_experiment(config, folder):
+        if config.seed == 0:
+            raise PhysicsOverflowError(3)
+        folder.mkdir()
+
+    monkeypatch.setattr(sweep, "run_experiment", run_experiment)
+    jobs = [(dataclasses.replace(tiny_config, seed=seed), tmp_path / f"tiny_s{seed}") for seed in range(2)]
+    with pytest.raises(SystemExit) as exit_info:
+        sweep.run_here(jobs)
+    assert exit_info.value.code == 1
+    assert "1 of 2 runs failed" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["tiny_s1"]
+
+
+@pytest.mark.parametrize("seed", ["-1", "1.5", "9223372036854775808"])
+def test_a_seed_is_a_whole_number_that_a_key_takes(seed, capsys):
+    assert f"{seed}: expected a whole number from 0 to 9223372036854775807" in fails(
+        capsys, evaluate.main, [str(POLICY), "--seed", seed]
+    )
 
 
 def test_a_sweep_goes_on_with_a_run_that_lacks_its_last_checkpoint(finished_run, tiny_config, tmp_path, capsys):

@@ -83,7 +83,7 @@ class DDPGState:
 # what does vary in the published runs the least is 1e-3.
 MIN_STD = 1e-4
 LOSS_METRICS = ("critic_loss", "actor_loss", "q")
-SUMS = (*LOSS_METRICS, "iterations", "updates", "episodes", "successes", "final_distance")
+SUMS = (*LOSS_METRICS, "updates", "episodes", "successes", "final_distance")
 
 
 def zero_sums() -> dict[str, jax.Array]:

@@ -94,7 +94,6 @@ class Explorer:
             diverged=ended[-1],
             overflow=jnp.sum(transitions.overflow),
             sums={
-                "iterations": jnp.ones(()),
                 "episodes": jnp.float32(self.num_envs),
                 "successes": jnp.sum(succeeded),
                 "final_distance": jnp.sum(transitions.distance[-1]),

@@ -12,6 +12,7 @@ DDPG. The peers need the extra `bench`.
 """
 
 import dataclasses
+import importlib.util
 import time
 from collections.abc import Callable, Iterator, Sequence
 
@@ -22,6 +23,7 @@ import numpy as np
 from hcp_jax import gym
 from hcp_jax.benchmarks.learner import benchmark_learner
 from hcp_jax.config import Config
+from hcp_jax.errors import UserError
 from hcp_jax.experiment.arm import ArmExperiment
 from hcp_jax.experiment.build import make_experiment
 
@@ -49,7 +51,11 @@ def benchmark_training(config: Config, rows: Sequence[str], seconds: float) -> I
 
     Yields:
         name, task, samples_per_step, control_steps_per_second.
+
+    Raises:
+        UserError: a peer is not installed; nothing was measured.
     """
+    check_installed([name for name in rows if name in PEERS[config.task]])
     for name in rows:
         if name == "hcp_jax":
             speed = benchmark_learner(config, seconds)[0]["control_steps_per_second"]
@@ -60,6 +66,13 @@ def benchmark_training(config: Config, rows: Sequence[str], seconds: float) -> I
             speed = time_peer(config, seconds)
         per_step = round(samples_per_step(config), 3)
         yield {"name": name, "task": config.task, "samples_per_step": per_step, "control_steps_per_second": round(speed, 1)}
+
+
+def check_installed(peers: Sequence[str]) -> None:
+    """Raises UserError for a peer whose package is missing."""
+    for name in peers:
+        if name.startswith("sb3") and importlib.util.find_spec("stable_baselines3") is None:
+            raise UserError(f"--rows {name}: needs the extra bench: pip install stable-baselines3")
 
 
 def time_sb3_ppo(config: Config, seconds: float) -> float:

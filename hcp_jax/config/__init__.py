@@ -7,9 +7,10 @@ from hcp_jax.config.ddpg import DDPGConfig
 from hcp_jax.config.embedding import EmbeddingConfig
 from hcp_jax.config.hopper import HopperConfig, HopperPoolConfig
 from hcp_jax.config.ppo import PPOConfig
-from hcp_jax.config.run import Config
+from hcp_jax.config.run import MAX_SEED, Config
 
 __all__ = [
+    "MAX_SEED",
     "ArmConfig",
     "ArmPoolConfig",
     "Config",

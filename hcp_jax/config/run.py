@@ -15,6 +15,7 @@ from hcp_jax.physics.base import PHYSICS
 TASKS = ("hopper", "reacher", "peg_insertion")
 ALGORITHM_OF = {"hopper": "ppo", "reacher": "ddpg", "peg_insertion": "ddpg"}
 INIT_LAYERS = ("hidden", "all")
+MAX_SEED = 2**63 - 1  # what a JAX key takes
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,8 +88,8 @@ class Config:
             require(getattr(self, field) in allowed, field, getattr(self, field), f"one of {', '.join(allowed)}")
         for field in ("total_env_steps", "eval_every", "eval_robots", "keep_checkpoints", "max_skipped_updates"):
             require(getattr(self, field) >= 1, field, getattr(self, field), "at least 1")
-        for field in ("seed", "num_envs"):
-            require(getattr(self, field) >= 0, field, getattr(self, field), "at least 0")
+        require(0 <= self.seed <= MAX_SEED, "seed", self.seed, f"0 to {MAX_SEED}")
+        require(self.num_envs >= 0, "num_envs", self.num_envs, "at least 0")
 
     def _check_parts(self) -> None:
         kinds = (HopperPoolConfig, HopperConfig) if self.task == "hopper" else (ArmPoolConfig, ArmConfig)

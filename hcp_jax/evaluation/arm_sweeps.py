@@ -94,8 +94,8 @@ def choose_pools(
         return {name: make_own_pool(config.task, robot) for name, robot in own_robots.items()}
     if pool_folder:
         return split_types(load_pool(pool_folder, run.train_pool), types)
-    drawn = change_ranges(config, ranges)
     types = types or tuple(dict.fromkeys((*run.pool_config.types, *run.pool_config.left_out)))
+    drawn = change_ranges(config, ranges, types)
     return {name: make_heldout_arms(drawn, (name,), count) for name in types}
 
 

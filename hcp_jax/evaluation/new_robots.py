@@ -19,12 +19,15 @@ def check_types(config: Config, types: Sequence[str]) -> None:
             raise ConfigError(f"--types={name}: expected types out of {', '.join(known)}")
 
 
-def change_ranges(config: Config, changes: Sequence[RangeChange]) -> Config:
-    """`config` with other ranges of hardware. Raises ConfigError or RangeError."""
+def change_ranges(config: Config, changes: Sequence[RangeChange], types: Sequence[str] = ()) -> Config:
+    """`config` with other ranges of hardware for robots of `types`. Raises ConfigError or RangeError."""
     values = to_dict(config)
     pool = values["pool"]
-    # Random chains have ranges of their own, some under the names of the others'; a run draws from one kind.
-    ranges = pool["chain_ranges"] if set(pool.get("types", ())) & set(CHAIN_TYPES) else pool["ranges"]
+    # Random chains have ranges of their own, some under the names of the others'.
+    are_chains = {name in CHAIN_TYPES for name in types}
+    if changes and len(are_chains) > 1:
+        raise ConfigError(f"--range {changes[0][0]}: types {', '.join(types)} have no ranges in common; choose with --types")
+    ranges = pool["chain_ranges"] if True in are_chains else pool["ranges"]
     known = sorted(name for name, bounds in ranges.items() if not isinstance(bounds, float))
     for name, low, high in changes:
         if name not in known:

@@ -9,7 +9,7 @@ from hcp_jax.config import ConfigError
 from hcp_jax.evaluation.summary import average_curves, read_curve
 from hcp_jax.experiment.base import TrainingState
 from hcp_jax.experiment.build import make_experiment
-from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE
+from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE, read_rows
 from hcp_jax.training.policy_file import load_policy, write_policy
 from hcp_jax.training.run_folder import CONFIG_FILE, ENVIRONMENT_FILE, find_differences, read_config
 
@@ -18,7 +18,11 @@ _FILES = (CONFIG_FILE, ENVIRONMENT_FILE, TIMING_FILE, METRICS_FILE)  # of a run,
 
 def find_runs(runs: pathlib.Path) -> list[pathlib.Path]:
     """The run folders in `runs` that have been evaluated at least once."""
-    return sorted(path.parent for path in runs.glob(f"*/{CONFIG_FILE}") if (path.parent / METRICS_FILE).exists())
+    return sorted(path.parent for path in runs.glob(f"*/{CONFIG_FILE}") if _is_evaluated(path.parent))
+
+
+def _is_evaluated(folder: pathlib.Path) -> bool:
+    return (folder / METRICS_FILE).exists() and bool(read_rows(folder / METRICS_FILE))
 
 
 def publish_runs(folders: Sequence[pathlib.Path], out: pathlib.Path, policies: pathlib.Path) -> list[pathlib.Path]:

@@ -1,6 +1,5 @@
 """The paper's table 1 beside ours: zero-shot success on the type left out, one row for each policy that was evaluated."""
 
-import json
 import pathlib
 from collections.abc import Sequence
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from hcp_jax.config import ArmConfig, ArmPoolConfig, Config
 from hcp_jax.evaluation.groups import group_by_settings
+from hcp_jax.evaluation.records import naming, read_json
 from hcp_jax.evaluation.summary import deviation_over_seeds, name_algorithm, read_run_commit, read_wall_seconds
 from hcp_jax.training.run_folder import read_config
 
@@ -54,10 +54,11 @@ def group_evaluations(results: pathlib.Path) -> Sequence[Runs]:
     for path in sorted((results / "arms" / "evaluations").glob("*.json")):
         folder = results / "arms" / "runs" / path.stem
         if folder.is_dir():  # of a whole run: others have another name
-            record, config = json.loads(path.read_text()), read_config(folder)
+            record, config = read_json(path, dict), read_config(folder)
             assert isinstance(config.pool, ArmPoolConfig)
-            if len(config.pool.left_out) == 1 and config.pool.left_out[0] in record["types"]:
-                runs.append((path.stem, record, config))
+            with naming(path):
+                if len(config.pool.left_out) == 1 and config.pool.left_out[0] in record["types"]:
+                    runs.append((path.stem, record, config))
     measured = ("checkpoint_env_steps", "trials", "robots_per_trial")
     return group_by_settings(runs, lambda run: run[2], lambda run: tuple(run[1][name] for name in measured))
 

@@ -27,4 +27,5 @@ def for_own_robots(config: Config) -> Config:
     type, where v_h does not depend on the others."""
     if not isinstance(config.pool, ArmPoolConfig) or config.encoding not in OWN_ARM_CONDITIONINGS:
         return config
-    return dataclasses.replace(config, pool=dataclasses.replace(config.pool, robots_per_type=1, heldout_per_type=1))
+    pool = dataclasses.replace(config.pool, robots_per_type=1, heldout_per_type=1)
+    return dataclasses.replace(config, pool=pool, num_envs=config.resolved_num_envs)

@@ -23,15 +23,18 @@ SCALARS = ("torque_limit", "link_mass", "damping", "frictionloss", "armature")
 
 @dataclasses.dataclass(frozen=True)
 class Entry:
-    """One entry of an arm beside those of the training arms that have that joint: value, lowest and highest, SI units."""
+    """One entry of an arm beside those of the training arms that have that joint: value, lowest and highest, SI units; None
+    where no training arm has it."""
 
     name: str
     value: float
-    low: float
-    high: float
+    low: float | None
+    high: float | None
 
     @property
     def is_inside(self) -> bool:
+        if self.low is None or self.high is None:
+            return False
         tolerance = 1e-6 * max(1.0, abs(self.low), abs(self.high))
         return self.low - tolerance <= self.value <= self.high + tolerance
 
@@ -91,7 +94,11 @@ def compare_with(own: RobotPool, trained: RobotPool) -> list[Entry]:
                 trained.hardware["joint_range"][rows, slot, side],
             )
         entries += [
-            Entry(f"joint {slot} {name}", float(value), float(values.min()), float(values.max()))
+            Entry(
+                f"joint {slot} {name}",
+                float(value),
+                *((float(values.min()), float(values.max())) if len(rows) else (None, None)),
+            )
             for name, (value, values) in columns.items()
         ]
     return entries

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from hcp_jax.hardware.chain import MAX_JOINTS, Chain
-from hcp_jax.hardware.ranges import ChainRanges, sample_logarithmic, sample_uniform
+from hcp_jax.hardware.ranges import ChainRanges, RangeError, sample_logarithmic, sample_uniform
 from hcp_jax.hardware.reaching import MAX_ERROR, come_near, reach_points
 from hcp_jax.hardware.start_poses import GRID, REACHER_GOALS
 
@@ -18,6 +18,7 @@ MIN_JOINTS = 3  # that reach points in a volume, all links needed
 NUM_STARTS = 8  # start poses of each arm, of the points of `GRID`
 _MIN_STARTS = 4  # of them that it has to reach
 _NEAR = 0.2  # [m]
+_MAX_DRAWS = 2000  # of one arm
 
 
 def sample_reaching_chains(
@@ -29,12 +30,18 @@ def sample_reaching_chains(
 
     Returns:
         the arms, and their start poses [count, NUM_STARTS, 7] rad; some of them more than once where points are out of reach.
+
+    Raises:
+        RangeError: some arm was drawn `_MAX_DRAWS` times in vain.
     """
     grid, corners = (np.asarray(list(itertools.product(*axes))) for axes in (GRID, zip(*REACHER_GOALS, strict=True)))
     generators = [np.random.default_rng([*seed, robot]) for robot in range(count)]
     chains: dict[int, Chain] = {}
     starts = np.zeros((count, NUM_STARTS, MAX_JOINTS))
-    while missing := [robot for robot in range(count) if robot not in chains]:
+    for _ in range(_MAX_DRAWS):
+        missing = [robot for robot in range(count) if robot not in chains]
+        if not missing:
+            return [chains[robot] for robot in range(count)], starts
         drawn = [sample_chain(ranges, num_joints, generators[robot]) for robot in missing]
         points = np.stack([np.concatenate([corners, generators[i].permutation(grid)[:NUM_STARTS]]) for i in missing])
         near = np.flatnonzero(come_near(drawn, corners, _NEAR))
@@ -48,7 +55,10 @@ def sample_reaching_chains(
             chains[robot] = drawn[near[row]]
             poses = angles[row, len(corners) :][reached[row, len(corners) :]]
             starts[robot] = poses[np.arange(NUM_STARTS) % len(poses)]
-    return [chains[robot] for robot in range(count)], starts
+    raise RangeError(
+        f"chain_ranges: no arm of {num_joints} joints out of {_MAX_DRAWS} reaches the reacher's goals; "
+        f"reach={ranges.reach} and longest_link={ranges.longest_link} m may be too short"
+    )
 
 
 def sample_chain(ranges: ChainRanges, num_joints: int, rng: np.random.Generator) -> Chain:

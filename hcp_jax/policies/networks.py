@@ -113,7 +113,7 @@ class JointActor(nn.Module):
         joints, rest = split_joints(inputs)
         x, summary = encode_joints(joints, rest, self.hidden_sizes, self.layer_norm)
         x = jnp.concatenate([x, beside_each(x, jnp.concatenate([summary, rest], axis=-1))], axis=-1)
-        x = selu_layer(x, self.hidden_sizes[0], "each", self.layer_norm)
+        x = selu_layer(x, self.hidden_sizes[0], "hidden_each", self.layer_norm)
         init = nn.initializers.variance_scaling(1e-4, "fan_in", "truncated_normal")
         return jnp.tanh(nn.Dense(1, kernel_init=init, name="output")(x)[..., 0])
 
@@ -145,7 +145,7 @@ def encode_joints(
     place = jnp.broadcast_to(jnp.eye(num_joints), (*joints.shape[:-1], num_joints))
     x = jnp.concatenate([joints, place, beside_each(joints, rest)], axis=-1)
     for i in range(2):
-        x = selu_layer(x, hidden_sizes[0], f"joint_{i}", layer_norm)
+        x = selu_layer(x, hidden_sizes[0], f"hidden_joint_{i}", layer_norm)
     return x, jnp.mean(x, axis=-2)
 
 

@@ -103,7 +103,8 @@ def name_set(name: str) -> str:
     """What the hoppers of a record's set know of themselves."""
     if name.startswith(FIRST):
         return f"{int(name.removeprefix(FIRST)):,} control steps of its own"
-    return {"train": "training (robots trained on)", "heldout": "nothing: the mean"}[name]
+    names = {"train": "training (robots trained on)", "heldout": "nothing: the mean", "heldout_fitted": "a fit with its policy"}
+    return names[name]
 
 
 def make_new_hoppers(published: Published) -> Item:

@@ -79,7 +79,7 @@ class Checkpoints:
             raise CheckpointError(f"{self.folder}: the best checkpoint, {iteration}, cannot be read ({_say(error)})") from error
 
     def restore(self, template: TrainingState, policy_only: bool = False) -> tuple[int, TrainingState, list[str]]:
-        """Reads the newest checkpoint that can be read. Damaged ones are moved aside, unless this is read-only.
+        """Reads the newest checkpoint that can be read. Damaged newer ones are moved aside, unless this is read-only.
 
         Args:
             template: a state of the config's shapes.
@@ -93,16 +93,19 @@ class Checkpoints:
         """
         if not self.iterations():
             raise CheckpointError(f"{self.folder}: holds no checkpoint")
-        skipped = []
+        damaged: dict[int, str] = {}
         for iteration in self.iterations()[::-1]:
             try:
-                return iteration, self._read_checked(self._newest, template, iteration, policy_only), skipped
+                state = self._read_checked(self._newest, template, iteration, policy_only)
             except CheckpointError:
                 raise
             except Exception as error:  # orbax and tensorstore raise many kinds for damaged files
-                skipped.append(f"checkpoint {iteration} cannot be read and is passed over ({_say(error)})")
-                self._move_aside(iteration)
-        raise CheckpointError(f"{self.folder}: no readable checkpoint; {skipped[0]}")
+                damaged[iteration] = f"checkpoint {iteration} cannot be read and is passed over ({_say(error)})"
+            else:
+                for newer in damaged:
+                    self._move_aside(newer)
+                return iteration, state, list(damaged.values())
+        raise CheckpointError(f"{self.folder}: no readable checkpoint; {next(iter(damaged.values()))}")
 
     def _move_aside(self, iteration: int) -> None:
         if not self._read_only:

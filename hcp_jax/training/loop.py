@@ -141,7 +141,7 @@ class TrainingLoop:
                 state, metrics = self._evaluate(state)
             if any_process(interrupt.requested) and self._iteration < run.num_iterations:
                 return self._save_and_stop(state)
-        self._finish(state)
+        self._finish()
         return metrics
 
     def _check(self, state: TrainingState) -> None:
@@ -209,7 +209,7 @@ class TrainingLoop:
             self._metrics.close()
         self._progress.say(f"interrupted at {self._env_steps:,} steps; saved. Continue with --resume --out {self._folder}")
 
-    def _finish(self, state: TrainingState) -> None:
+    def _finish(self) -> None:
         self._checkpoints.wait()
         self._checkpoints.close()
         if self._metrics:

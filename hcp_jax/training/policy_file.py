@@ -5,9 +5,11 @@ from typing import Any
 
 import flax.serialization
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from hcp_jax.devices import shapes_of
+from hcp_jax.errors import one_line
 from hcp_jax.experiment.base import Experiment, TrainingState
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import CheckpointError, Checkpoints, check_architecture, leaf_name
@@ -35,9 +37,12 @@ def read_policy(folder: pathlib.Path, template: TrainingState) -> TrainingState:
         raise CheckpointError(f"{path}: damaged ({type(error).__name__})") from error
     shapes = {leaf_name(path): np.shape(leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(fields)}
     check_architecture(shapes, template, str(path))
-    return template.replace(
-        **flax.serialization.from_state_dict({name: getattr(template, name) for name in template.policy_fields}, fields)
-    )
+    empty = {name: getattr(template, name) for name in template.policy_fields}
+    try:
+        policy = flax.serialization.from_state_dict(empty, jax.tree.map(jnp.asarray, fields))
+    except ValueError as error:
+        raise CheckpointError(f"{path}: another architecture ({one_line(error)})") from error
+    return template.replace(**policy)
 
 
 def load_policy(folder: pathlib.Path, run: Experiment, best: bool = False) -> tuple[int, Any]:

@@ -9,6 +9,7 @@ from robot_texts import arm
 from hcp_jax import evaluate, robot
 from hcp_jax.hardware.arm import arm_spec, sample_hardware
 from hcp_jax.hardware.arm_pool import make_arm_pool
+from hcp_jax.hardware.catalogue import load_robot
 from hcp_jax.hardware.chain import read_chain
 from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
 from hcp_jax.hardware.own_arm import compare_with, find_nearest, make_own_pool
@@ -84,6 +85,14 @@ def test_the_arms_to_compare_with_are_those_of_a_policy(finished_arms, finished_
     with pytest.raises(SystemExit):
         robot.main([*arguments, "--policy", str(finished_run)])
     assert "expected one that was trained on types of arms" in capsys.readouterr().err
+
+
+def test_a_joint_that_no_training_arm_has_lies_outside(trained):
+    shorter = trained.subset(np.flatnonzero(trained.hardware["joint_mask"].sum(axis=1) < 7))
+    entries = compare_with(make_own_pool("reacher", load_robot("panda")), shorter)
+    seventh = [entry for entry in entries if entry.name.startswith("joint 6 ")]
+    assert len(seventh) > 5
+    assert not any(entry.is_inside or entry.low is not None for entry in seventh)
 
 
 def test_a_policy_is_evaluated_on_ones_own_arm(finished_arms, tmp_path):

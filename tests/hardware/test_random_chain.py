@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from hcp_jax.hardware import random_chain
 from hcp_jax.hardware.arm_pool import make_arm_pool
 from hcp_jax.hardware.catalogue import catalogue_names, load_robot
 from hcp_jax.hardware.chain import Chain
@@ -78,6 +79,12 @@ def test_arms_reach_the_corners_of_the_goals():
     arms, _ = sample_reaching_chains(ChainRanges(), 6, 2, [0, 0, 13])
     corners = np.asarray(list(itertools.product(*zip(*REACHER_GOALS, strict=True))))
     assert (reach_points(arms, np.tile(corners, (2, 1, 1)), 1, num_samples=2048, num_starts=8)[1] < MAX_ERROR).all()
+
+
+def test_ranges_that_no_arm_reaches_the_goals_with_are_refused(monkeypatch):
+    monkeypatch.setattr(random_chain, "_MAX_DRAWS", 5)
+    with pytest.raises(RangeError, match="no arm of 6 joints out of 5 reaches the reacher's goals"):
+        sample_reaching_chains(ChainRanges(reach=(0.05, 0.1)), 6, 2, (0,))
 
 
 def test_of_two_ways_to_a_point_the_one_nearer_to_zero_is_taken():

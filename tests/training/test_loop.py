@@ -96,6 +96,19 @@ def test_a_damaged_checkpoint_is_passed_over_with_a_line(finished_run, tiny_conf
     assert (folder / "metrics.csv").read_bytes() == (finished_run / "metrics.csv").read_bytes()
 
 
+def test_where_no_checkpoint_can_be_read_all_stay_where_they_are(finished_run, tiny_config, tmp_path):
+    folder = shutil.copytree(finished_run, tmp_path / "run")
+    checkpoints = sorted(path.name for path in (folder / "checkpoints" / "newest").iterdir())
+    for path in (folder / "checkpoints" / "newest").rglob("*"):
+        if path.is_file():
+            path.write_bytes(b"")
+    for _ in range(2):
+        with pytest.raises(CheckpointError, match="no readable checkpoint; checkpoint 8 cannot be read"):
+            loop.train(tiny_config, folder, resume=True)
+    assert sorted(path.name for path in (folder / "checkpoints" / "newest").iterdir()) == checkpoints
+    assert (folder / "metrics.csv").read_bytes() == (finished_run / "metrics.csv").read_bytes()
+
+
 def test_a_checkpoint_damaged_again_is_moved_aside_again(finished_run, tiny_config, tmp_path):
     folder = shutil.copytree(finished_run, tmp_path / "run")
     for _ in range(2):
