@@ -58,6 +58,10 @@ def main(arguments: list[str] | None = None) -> None:
             raise ConfigError("--range: not with --pool, whose robots are drawn already")
         if options.first_steps and task != "hopper":
             raise ConfigError("--first-steps: goes with a policy of hoppers")
+        if (options.base or options.tip) and not options.robot:
+            raise ConfigError("--base, --tip: go with --robot")
+        if (options.fit_steps or 0) < 0:
+            raise ConfigError(f"--fit-steps={options.fit_steps}: expected at least 0")
         if options.robot and (task == "hopper" or options.types or options.pool or options.range):
             raise ConfigError("--robot: goes with a policy of arms, and not with --types, --pool or --range")
         command_line.enable_compilation_cache()

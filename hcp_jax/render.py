@@ -34,6 +34,8 @@ def main(arguments: list[str] | None = None) -> None:
         chosen = [read_robot(word) for word in options.robots or ()]
         if len(chosen) > MAX_ROBOTS:
             raise ConfigError(f"--robots: {len(chosen)} of them: expected at most {MAX_ROBOTS}")
+        if (options.base or options.tip) and not options.robot:
+            raise ConfigError("--base, --tip: go with --robot")
         if options.robot and read_config(options.run).task == "hopper":
             raise ConfigError("--robot: goes with a policy of arms")
         check_output(options.out)

@@ -231,6 +231,14 @@ def test_a_run_that_breaks_does_not_keep_a_sweep_from_the_others(tiny_config, tm
     assert [path.name for path in tmp_path.iterdir()] == ["tiny_s1"]
 
 
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [(["--tip", "hand"], "--base, --tip: go with --robot"), (["--fit-steps", "-5"], "--fit-steps=-5: expected at least 0")],
+)
+def test_options_that_would_be_ignored_are_refused(arguments, expected, capsys):
+    assert expected in fails(capsys, evaluate.main, [str(POLICY), *arguments])
+
+
 @pytest.mark.parametrize("seed", ["-1", "1.5", "9223372036854775808"])
 def test_a_seed_is_a_whole_number_that_a_key_takes(seed, capsys):
     assert f"{seed}: expected a whole number from 0 to 9223372036854775807" in fails(

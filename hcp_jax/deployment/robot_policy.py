@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hcp_jax.config import ArmConfig
+from hcp_jax.envs.goal import MAX_SPEED
 from hcp_jax.envs.hopper import MAX_OBSERVED_VELOCITY
 from hcp_jax.experiment.arm import ArmExperiment, make_goal_conditioning
 from hcp_jax.experiment.chosen_robots import ChosenRobot
@@ -59,6 +60,7 @@ def _arm_policy(run: ArmExperiment, state: Any, robot: ChosenRobot) -> Callable[
     def act(obs: jax.Array) -> jax.Array:
         angles, velocities, goal = jnp.split(obs, [count, 2 * count])
         index = jnp.zeros(1, jnp.int32)
+        velocities = jnp.clip(velocities, -MAX_SPEED, MAX_SPEED)  # as in training
         padded = [jnp.pad(part[None], ((0, 0), (0, MAX_JOINTS - count))) for part in (angles, velocities)]
         obs = jnp.concatenate([slots.to_entries(part, index) for part in padded], axis=-1)
         action = run.learner.mean_action(networks, statistics, conditioning, index, obs, goal[None])

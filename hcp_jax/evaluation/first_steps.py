@@ -47,6 +47,8 @@ def regress_v_h(
         raise ConfigError(f"--first-steps: {run.config.name} has no forward model to regress v_h with; {what}")
     if min(steps) < 1:
         raise ConfigError(f"--first-steps={min(steps)}: expected at least 1")
+    # Of a state that was loaded the other fields hold shapes alone.
+    state = state.replace(**{name: None for name in state.__dataclass_fields__ if name not in state.policy_fields})
     variables, actions = jax.jit(act, static_argnums=(0, 1, 3))(run.ppo, run.make_env(pool), state, max(steps), key)
     fit = jax.jit(fit_v_h, static_argnums=0)
     return {n: fit(run.ppo, state, variables[:n], actions[:n], key) for n in steps}

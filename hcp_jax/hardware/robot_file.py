@@ -83,6 +83,8 @@ def read_robot_here(path: pathlib.Path, base: str | None, tip: str | None) -> Ro
     """`read_robot` in this process, which a hostile file may take down."""
     notes: list[str] = []
     root = parse_xml(path)
+    if root.tag not in ("robot", "mujoco"):
+        raise RobotFileError(f"starts with <{root.tag}>: expected <robot> (URDF) or <mujoco> (MJCF)")
     spec = load_urdf(root) if root.tag == "robot" else load_mjcf(path, root, notes)
     name_all(spec)
     names = [body.name for body in spec.bodies]
@@ -112,7 +114,10 @@ def read_robot_here(path: pathlib.Path, base: str | None, tip: str | None) -> Ro
 
 
 def parse_xml(path: pathlib.Path) -> ElementTree.Element:
-    """The root of a URDF or MJCF file. Document types are refused: with them a short file can expand without bound."""
+    """The root of a URDF or MJCF file, or of one that it includes.
+
+    Document types are refused: with them a short file can expand without bound.
+    """
     try:
         if path.stat().st_size > MAX_BYTES:
             raise RobotFileError(f"larger than {MAX_BYTES / 1e6:.0f} MB")
@@ -132,8 +137,6 @@ def parse_xml(path: pathlib.Path) -> ElementTree.Element:
         if isinstance(error, RobotFileError):
             raise
         raise RobotFileError(f"not XML ({one_line(error)})") from error
-    if root.tag not in ("robot", "mujoco"):
-        raise RobotFileError(f"starts with <{root.tag}>: expected <robot> (URDF) or <mujoco> (MJCF)")
     return root
 
 
@@ -215,8 +218,7 @@ def check_references(folder: pathlib.Path, where: pathlib.Path, root: ElementTre
                 raise RobotFileError(f"<include file={name!r}> includes itself")
             seen.add(target)
             if target.exists():
-                included = ElementTree.fromstring(target.read_bytes())
-                check_references(folder, where, included, seen)
+                check_references(folder, where, parse_xml(target), seen)
 
 
 def remove_all_but_bodies(spec: mujoco.MjSpec) -> None:

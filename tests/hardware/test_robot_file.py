@@ -171,3 +171,13 @@ def try_to_read(path) -> str | None:
         read_robot(path)
     except RobotFileError as error:
         return str(error)
+
+
+def test_what_a_file_includes_is_held_to_the_same_rules(tmp_path):
+    (tmp_path / "arm.xml").write_text('<mujoco><include file="part.xml"/><worldbody/></mujoco>')
+    (tmp_path / "part.xml").write_text(BOMB)
+    with pytest.raises(RobotFileError, match="document type declaration"):
+        read_robot_here(tmp_path / "arm.xml", None, None)
+    (tmp_path / "part.xml").write_text("<mujocoinclude>")
+    with pytest.raises(RobotFileError, match="not XML"):
+        read_robot_here(tmp_path / "arm.xml", None, None)

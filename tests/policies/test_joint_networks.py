@@ -48,7 +48,7 @@ def test_all_joints_share_their_layers(obs):
     action = actor.init_with_output(jax.random.key(0), inputs)[0]
     assert action.shape == (1, 7)
     for params in (actor.init(jax.random.key(0), inputs), critic.init(jax.random.key(0), inputs, action)):
-        first = params["params"]["joint_0"]["kernel"]
+        first = params["params"]["hidden_joint_0"]["kernel"]
         assert first.shape[0] in (15 + 7 + 21, 16 + 7 + 21), "one joint, its place and the rest"
 
 
