@@ -5,6 +5,7 @@ new robot acts for some steps as the training robots did while they were identif
 frozen model predicts these steps best, drawn a little towards the training robots' mean. Policy and model learn nothing.
 """
 
+import dataclasses
 from collections.abc import Sequence
 
 import jax
@@ -48,7 +49,7 @@ def regress_v_h(
     if min(steps) < 1:
         raise ConfigError(f"--first-steps={min(steps)}: expected at least 1")
     # Of a state that was loaded the other fields hold shapes alone.
-    state = state.replace(**{name: None for name in state.__dataclass_fields__ if name not in state.policy_fields})
+    state = state.replace(**{field.name: None for field in dataclasses.fields(state) if field.name not in state.policy_fields})
     variables, actions = jax.jit(act, static_argnums=(0, 1, 3))(run.ppo, run.make_env(pool), state, max(steps), key)
     fit = jax.jit(fit_v_h, static_argnums=0)
     return {n: fit(run.ppo, state, variables[:n], actions[:n], key) for n in steps}
