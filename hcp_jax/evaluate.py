@@ -1,12 +1,13 @@
 """`python -m hcp_jax.evaluate RUN [--types H] [--trials 10] [--robots-per-trial 100] [--physics native-rk4] [--json FILE]`"""
 
+import argparse
 import pathlib
 
 from rich.console import Console
 from rich.table import Table
 
 from hcp_jax import command_line
-from hcp_jax.config import ConfigError
+from hcp_jax.config import Config, ConfigError
 from hcp_jax.evaluation.arm_sweeps import evaluate_arms
 from hcp_jax.evaluation.hopper_sweeps import evaluate_hoppers
 from hcp_jax.evaluation.new_robots import RangeChange, check_types
@@ -48,22 +49,9 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--without-robots", action="store_true", help="leave the rows of single robots out of that file")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
-        for name in ("trials", "robots_per_trial"):
-            if getattr(options, name) < 1:
-                raise ConfigError(f"--{name.replace('_', '-')}={getattr(options, name)}: expected at least 1")
         config = read_config(options.run)
         task = config.task
-        check_types(config, options.types or ())
-        if options.pool and options.range:
-            raise ConfigError("--range: not with --pool, whose robots are drawn already")
-        if options.first_steps and task != "hopper":
-            raise ConfigError("--first-steps: goes with a policy of hoppers")
-        if (options.base or options.tip) and not options.robot:
-            raise ConfigError("--base, --tip: go with --robot")
-        if (options.fit_steps or 0) < 0:
-            raise ConfigError(f"--fit-steps={options.fit_steps}: expected at least 0")
-        if options.robot and (task == "hopper" or options.types or options.pool or options.range):
-            raise ConfigError("--robot: goes with a policy of arms, and not with --types, --pool or --range")
+        check_options(options, config)
         command_line.enable_compilation_cache()
         settings = {name: getattr(options, name) for name in ("trials", "robots_per_trial", "physics", "seed", "best")}
         settings |= {"ranges": [read_range(*words) for words in options.range], "pool_folder": options.pool}
@@ -78,6 +66,24 @@ def main(arguments: list[str] | None = None) -> None:
         if options.json:
             left_out = ("robots",) if options.without_robots else ()
             write_json(options.json, {name: value for name, value in record.items() if name not in left_out})
+
+
+def check_options(options: argparse.Namespace, config: Config) -> None:
+    """Raises ConfigError for options that are out of range, or would be ignored beside the others or with this policy."""
+    for name in ("trials", "robots_per_trial"):
+        if getattr(options, name) < 1:
+            raise ConfigError(f"--{name.replace('_', '-')}={getattr(options, name)}: expected at least 1")
+    check_types(config, options.types or ())
+    if options.pool and options.range:
+        raise ConfigError("--range: not with --pool, whose robots are drawn already")
+    if options.first_steps and config.task != "hopper":
+        raise ConfigError("--first-steps: goes with a policy of hoppers")
+    if (options.base or options.tip) and not options.robot:
+        raise ConfigError("--base, --tip: go with --robot")
+    if (options.fit_steps or 0) < 0:
+        raise ConfigError(f"--fit-steps={options.fit_steps}: expected at least 0")
+    if options.robot and (config.task == "hopper" or options.types or options.pool or options.range):
+        raise ConfigError("--robot: goes with a policy of arms, and not with --types, --pool or --range")
 
 
 def read_range(name: str, low: str, high: str) -> RangeChange:
