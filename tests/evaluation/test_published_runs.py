@@ -6,8 +6,8 @@ import re
 import pytest
 
 from hcp_jax.command_line import load_config, load_configs
-from hcp_jax.config import Config, field_names, from_dict, to_dict
-from hcp_jax.training.run_folder import read_config
+from hcp_jax.config import Config, from_dict, to_dict
+from hcp_jax.training import run_folder
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RUNS = sorted(path.parent for task in ("arms", "hopper") for path in (ROOT / "results" / task / "runs").glob("*/config.json"))
@@ -47,14 +47,7 @@ def experiments() -> dict[str, Config]:
 
 def find_differences(one: Config, other: Config) -> set[str]:
     """Dotted names of the fields in which two configs differ, beside those in `FREE`."""
-    return {name for name in field_names(one) if look_up(one, name) != look_up(other, name)} - FREE
-
-
-def look_up(config: Config, name: str) -> object:
-    value = to_dict(config)
-    for part in name.split("."):
-        value = value[part]
-    return value
+    return {name for name, *_ in run_folder.find_differences(one, other)} - FREE
 
 
 def test_there_are_published_runs():
@@ -64,7 +57,7 @@ def test_there_are_published_runs():
 @pytest.mark.parametrize("folder", RUNS, ids=lambda folder: folder.name)
 def test_a_published_run_has_the_settings_of_its_experiment(folder, experiments):
     name = re.sub(r"_s\d+$", "", folder.name)
-    differences = find_differences(read_config(folder), experiments[name])
+    differences = find_differences(run_folder.read_config(folder), experiments[name])
     assert differences == OLDER.get(folder.name, ("", set()))[1]
 
 
