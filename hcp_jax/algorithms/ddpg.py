@@ -79,9 +79,7 @@ class DDPGState:
     sums: dict[str, jax.Array]
 
 
-# What varies less did not vary, but for rounding: constants of robots with angles of 0 have deviations of 1e-6 to 1e-5, and of
-# what does vary in the published runs the least is 1e-3.
-MIN_STD = 1e-4
+MIN_STD = 1e-6  # to which brax's running statistics are clipped from below
 LOSS_METRICS = ("critic_loss", "actor_loss", "q")
 SUMS = (*LOSS_METRICS, "updates", "episodes", "successes", "final_distance")
 
