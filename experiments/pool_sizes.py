@@ -13,16 +13,7 @@ ROBOTS_PER_TYPE = (10, 40, 140, 560, 1440)
 
 
 def get_configs() -> list[Config]:
-    config = presets.arm(
-        "reacher_pool",
-        "reacher",
-        "chain_fk",
-        left_out="H",
-        joint_slots="aligned",
-        total_env_steps=2_304_000,
-        eval_every=384_000,
-        ddpg=dataclasses.replace(presets.FAST_DDPG, **presets.SMALL_BATCHES),
-    )
+    config = presets.quick_reacher("reacher_pool", left_out="H", total_env_steps=2_304_000)
     return [
         dataclasses.replace(
             config,

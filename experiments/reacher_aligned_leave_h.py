@@ -1,0 +1,8 @@
+"""Exp. I of the paper: reacher, random goals, type H left out; HCP-E, aligned joints. Preset: fast with small batches."""
+
+from hcp_jax import presets
+from hcp_jax.config import Config
+
+
+def get_config() -> Config:
+    return presets.quick_reacher("reacher_aligned_leave_h", left_out="H")
