@@ -62,13 +62,15 @@ def run_here(jobs: list[Job]) -> bool:
     """Runs one after the other. Returns whether all are done; False if the user interrupted one. Ends the command as
     `run_there` does."""
     failed = []
-    for config, folder in jobs:
-        try:
-            if run_experiment(config, folder):
+    with loop.Interrupt().installed() as interrupt:
+        for config, folder in jobs:
+            try:
+                run_experiment(config, folder, interrupt)
+            except (PhysicsOverflowError, NonFiniteError) as error:
+                print(f"{folder}: {one_line(error)}", flush=True)
+                failed.append(folder)
+            if interrupt.requested:
                 return False
-        except (PhysicsOverflowError, NonFiniteError) as error:
-            print(f"{folder}: {one_line(error)}", flush=True)
-            failed.append(folder)
     end_if_failed(failed, jobs)
     return True
 
@@ -97,15 +99,15 @@ def run_in_worker(config: dict, folder: str) -> None:
         raise RuntimeError("interrupted; saved")
 
 
-def run_experiment(config: Config, folder: pathlib.Path) -> bool:
-    """Trains, resumes or skips one experiment. Returns whether the user interrupted it."""
+def run_experiment(config: Config, folder: pathlib.Path, interrupt: loop.Interrupt | None = None) -> bool:
+    """Trains, resumes or skips one experiment. Returns whether it was interrupted before its end."""
     resume = (folder / run_folder.CONFIG_FILE).exists()
     if resume:
         iterations = latest_iteration(folder / run_folder.CHECKPOINT_FOLDER) or 0
         if iterations * config.batch_size >= config.total_env_steps:
             print(f"{folder}: done", flush=True)
             return False
-    return loop.train(config, folder, resume) is None
+    return loop.train(config, folder, resume, interrupt) is None
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import pathlib
 import shutil
+import signal
 
 import pytest
 
@@ -217,7 +218,7 @@ def test_a_sweep_refuses_no_seeds_and_a_folder_of_another_setting(finished_run, 
 
 
 def test_a_run_that_breaks_does_not_keep_a_sweep_from_the_others(tiny_config, tmp_path, capsys, monkeypatch):
-    def run_experiment(config, folder):
+    def run_experiment(config, folder, interrupt):
         if config.seed == 0:
             raise PhysicsOverflowError(3)
         folder.mkdir()
@@ -229,6 +230,18 @@ def test_a_run_that_breaks_does_not_keep_a_sweep_from_the_others(tiny_config, tm
     assert exit_info.value.code == 1
     assert "1 of 2 runs failed" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["tiny_s1"]
+
+
+def test_ctrl_c_in_a_runs_last_seconds_ends_the_sweep_after_it(tiny_config, tmp_path, monkeypatch):
+    def run_experiment(config, folder, interrupt):
+        folder.mkdir()
+        signal.raise_signal(signal.SIGINT)  # too late for a checkpoint before the last
+        return False
+
+    monkeypatch.setattr(sweep, "run_experiment", run_experiment)
+    jobs = [(dataclasses.replace(tiny_config, seed=seed), tmp_path / f"tiny_s{seed}") for seed in range(2)]
+    assert not sweep.run_here(jobs)
+    assert [path.name for path in tmp_path.iterdir()] == ["tiny_s0"]
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from hcp_jax.training import run_folder
 from hcp_jax.training.policy_file import load_policy
 
 SIM_DT = 0.001  # [s], with RK4: nothing was trained on it
+DIVERGED = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,7 +58,10 @@ CONDITIONS = {
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
-    """One goal: whether it was reached, distances [m] at the end (which is when it is reached) and at the closest, steps."""
+    """One goal: whether it was reached, distances [m] at the end (which is when it is reached) and at the closest, steps.
+
+    An arm whose physics diverges fails where it was before.
+    """
 
     goal: tuple[float, ...]
     success: bool
@@ -144,21 +148,27 @@ def play(
         rng: of noise and jitter.
     """
     data, limit = mujoco.MjData(model), model.actuator_gear[:, 0]
+
+    def measure_distance() -> float:
+        mujoco.mj_kinematics(model, data)
+        return float(np.linalg.norm(data.site(TIP_SITE).xpos - goal))
+
     data.qpos[:] = start
     waiting = deque([np.zeros(model.nu)] * conditions.delay)
     noise = np.repeat([conditions.angle_noise, conditions.velocity_noise], model.nv)
-    distance = closest = np.inf
-    steps = 0
-    while distance >= task.success_distance and steps < task.episode_length:
+    distance = closest = measure_distance()
+    success, steps = False, 0
+    while not success and steps < task.episode_length:
         sensed = np.concatenate([data.qpos, data.qvel]) + noise * rng.normal(size=2 * model.nv)
         waiting.append(np.asarray(act(np.concatenate([sensed, goal]).astype(np.float32))) / limit)
         data.ctrl[:] = waiting.popleft()
         period = CTRL_DT + conditions.jitter * rng.uniform(-1.0, 1.0)
         mujoco.mj_step(model, data, nstep=max(1, round(period / SIM_DT)))
-        mujoco.mj_kinematics(model, data)
-        distance = float(np.linalg.norm(data.site(TIP_SITE).xpos - goal))
-        closest, steps = min(closest, distance), steps + 1
-    return Trial(tuple(goal.tolist()), distance < task.success_distance, distance, closest, steps)
+        if any(data.warning[kind].number for kind in DIVERGED):  # MuJoCo has reset the arm to its first state
+            break
+        distance, steps = measure_distance(), steps + 1
+        closest, success = min(closest, distance), distance < task.success_distance
+    return Trial(tuple(goal.tolist()), success, distance, closest, steps)
 
 
 def summarise(trials: list[Trial]) -> dict:

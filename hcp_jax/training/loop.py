@@ -60,8 +60,16 @@ class Interrupt:
         self.requested = True
 
 
-def train(config: Config, folder: pathlib.Path, resume: bool = False) -> dict[str, float] | None:
+def train(
+    config: Config, folder: pathlib.Path, resume: bool = False, interrupt: Interrupt | None = None
+) -> dict[str, float] | None:
     """Trains `config` in `folder`, which all processes that train together see and process 0 writes.
+
+    Args:
+        config: settings.
+        folder: of the run.
+        resume: go on from its newest checkpoint.
+        interrupt: of a caller who has it installed around several runs; by default the run installs its own.
 
     Returns:
         The last evaluation's metrics, or None if there was none: the run was interrupted, and saved, or was at its end already.
@@ -88,10 +96,12 @@ def train(config: Config, folder: pathlib.Path, resume: bool = False) -> dict[st
                 run_folder.write_start(folder, config, run.physics)
 
         do_in_main(open_folder)
-        return _run(run, state, folder, resume)
+        return _run(run, state, folder, resume, held.enter_context(Interrupt().installed()) if interrupt is None else interrupt)
 
 
-def _run(run: Experiment, state: TrainingState, folder: pathlib.Path, resume: bool) -> dict[str, float] | None:
+def _run(
+    run: Experiment, state: TrainingState, folder: pathlib.Path, resume: bool, interrupt: Interrupt
+) -> dict[str, float] | None:
     """Trains from the newest checkpoint, if there is one to resume from, else from `state`."""
     checkpoints = Checkpoints(folder / run_folder.CHECKPOINT_FOLDER, run.config.keep_checkpoints)
     iteration = 0
@@ -102,8 +112,7 @@ def _run(run: Experiment, state: TrainingState, folder: pathlib.Path, resume: bo
         say(f"resuming at {iteration * run.config.batch_size:,} steps")
     elif resume:
         say("the run ended before its first checkpoint: starting again")
-    with Interrupt().installed() as interrupt:
-        return TrainingLoop(run, folder, checkpoints, iteration).run(state, interrupt)
+    return TrainingLoop(run, folder, checkpoints, iteration).run(state, interrupt)
 
 
 class TrainingLoop:

@@ -85,6 +85,17 @@ def test_an_episode_ends_where_the_goal_is_reached(arm):
     assert (trial.success, trial.episode_length) == (True, 1)
 
 
+def test_an_arm_whose_physics_diverges_fails_though_mujoco_resets_it_to_where_the_goal_is(arm):
+    model = make_model(arm, IDEAL)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    goal = data.site("ref_pt").xpos.copy()
+    start = np.array([1.0, 1.0, 1.0, 1.0, 2e10])  # [rad] the last one beyond what MuJoCo takes
+    trial = play(model, lambda _: np.zeros(5), start, goal, IDEAL, ArmConfig(), np.random.default_rng(0))
+    assert (trial.success, trial.episode_length) == (False, 0)
+    assert np.isfinite(trial.final_distance)
+
+
 def test_real_conditions_are_the_parts_that_are_also_tried_alone():
     parts = [dataclasses.asdict(CONDITIONS[name]) for name in CONDITIONS if name not in ("ideal", "real")]
     ideal, together = dataclasses.asdict(IDEAL), {}
