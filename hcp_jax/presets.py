@@ -152,7 +152,7 @@ def arm(
 
 
 def quick_reacher(name: str, left_out: str, **changes) -> Config:
-    """The reacher with `chain_fk`, aligned joints and small batches: at 96 % in half the steps. `changes` are fields of `Config`."""
+    """The reacher with `chain_fk`, aligned joints and small batches. `changes` are fields of `Config`."""
     schedule = {
         "total_env_steps": 3_072_000,
         "eval_every": 384_000,
