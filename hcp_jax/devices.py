@@ -20,6 +20,9 @@ ROWS = PartitionSpec("rows")
 EVERYWHERE = PartitionSpec()
 # As JAX reads the first of them; where the others are not set, it asks the cluster (Slurm, Open MPI, Kubernetes, TPU pods).
 COORDINATOR, NUM_PROCESSES, PROCESS_ID = "JAX_COORDINATOR_ADDRESS", "JAX_NUM_PROCESSES", "JAX_PROCESS_ID"
+# Rows of a matrix product up to which a CPU is faster with one thread: handing out the parts takes longer than multiplying. Of
+# DDPG's updates, one thread took 21 % less than two with 128 rows and 14 % more with 1,024.
+SMALL_BATCH = 256
 
 
 class JoinError(UserError):
@@ -49,6 +52,13 @@ def join_processes() -> None:
 def count_cores() -> int:
     """Processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def options_for_batch(batch_size: int) -> dict[str, bool] | None:
+    """Compiler options of jitted updates from batches of this size."""
+    if jax.default_backend() == "cpu" and batch_size <= SMALL_BATCH:
+        return {"xla_cpu_multi_thread_eigen": False}
+    return None
 
 
 def is_main() -> bool:

@@ -102,6 +102,10 @@ BAD_ARGUMENTS = {
         "pool.types=(): expected at least 1 type, or",
     ),
     "types beside an arm": (["--config", REACHER, "--config.robot=panda"], "expected () beside robot='panda'"),
+    "a split beside an arm": (
+        ["--config", FINETUNE, "--config.robot=panda", "--config.pool.split=new"],
+        "pool.split='new': expected 'train' beside robot='panda'",
+    ),
     "an arm for the hopper": (["--config", HOPPER, "--config.robot=panda"], "robot='panda': expected none for the hopper"),
     "an arm that is not there": (
         ["--config", FINETUNE, "--config.robot=pandas", "--config.init="],

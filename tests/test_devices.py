@@ -8,10 +8,11 @@ import os
 import subprocess
 import sys
 
+import jax
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.slow
+from hcp_jax.devices import options_for_batch
 
 SCRIPT = """
 import json, sys
@@ -57,6 +58,13 @@ json.dump(results, sys.stdout)
 """
 
 
+def test_a_cpu_multiplies_small_batches_on_one_thread_and_no_other_device_is_told_so(monkeypatch):
+    assert options_for_batch(128) == {"xla_cpu_multi_thread_eigen": False}
+    assert options_for_batch(1024) is None
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    assert options_for_batch(128) is None
+
+
 def train_on(num_devices: int, names: tuple[str, ...]) -> dict:
     flags = {"XLA_FLAGS": f"--xla_force_host_platform_device_count={num_devices}", "JAX_PLATFORMS": "cpu"}
     command = [sys.executable, "-c", SCRIPT, *names]
@@ -65,6 +73,7 @@ def train_on(num_devices: int, names: tuple[str, ...]) -> dict:
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("num_devices", "names"), [(2, ("arms",)), (4, ("hopper", "arms", "mjx"))])
 def test_training_on_several_devices_comes_out_as_on_one(num_devices, names):
     on_one, on_many = (train_on(count, names) for count in (1, num_devices))

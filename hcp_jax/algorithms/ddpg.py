@@ -25,7 +25,7 @@ from hcp_jax.algorithms.optimizers import make_ddpg_optimizer
 from hcp_jax.algorithms.replay import EpisodeBatch, Replay, StepSample, add_episodes, episode_shapes, init_replay, sample_steps
 from hcp_jax.algorithms.returns import sum_rewards
 from hcp_jax.config import DDPGConfig
-from hcp_jax.devices import put_everywhere, split_rows
+from hcp_jax.devices import options_for_batch, put_everywhere, split_rows
 from hcp_jax.policies.networks import Critic, DeterministicActor, JointActor, JointCritic
 
 Params = dict[str, Any]  # {"actor": ..., "critic": ... with a leading axis of critics, "embedding": [N, K] or None}
@@ -118,7 +118,7 @@ class DDPG:
         self._num_iterations = num_iterations
         self._optimizer = make_ddpg_optimizer(config, num_iterations, embedding_learning_rate)
         self._explorer = Explorer(env, self._explored_action, config, num_envs)
-        self.train = jax.jit(self._train, donate_argnums=0)
+        self.train = jax.jit(self._train, donate_argnums=0, compiler_options=options_for_batch(config.batch_size))
 
     def buffer_shapes(self) -> EpisodeBatch:
         """Shapes of the replay buffer."""

@@ -101,6 +101,7 @@ class Config:
         if self.robot:
             require(not pool.types, "pool.types", pool.types, f"() beside robot={self.robot!r}")
             require(not pool.left_out, "pool.left_out", pool.left_out, f"() beside robot={self.robot!r}")
+            require(pool.split == "train", "pool.split", pool.split, f"'train' beside robot={self.robot!r}")
             allowed = OWN_ARM_CONDITIONINGS
             require(self.encoding in allowed, "encoding", self.encoding, f"one of {', '.join(allowed)}")
         else:
