@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from hcp_jax.algorithms.optimizers import mark_kernels
 from hcp_jax.devices import shapes_of
 from hcp_jax.errors import one_line
 from hcp_jax.experiment.base import Experiment, TrainingState
@@ -16,10 +17,12 @@ from hcp_jax.training.checkpoint import CheckpointError, Checkpoints, check_arch
 
 
 def write_policy(folder: pathlib.Path, state: TrainingState) -> pathlib.Path:
-    """Writes `policy.msgpack`: networks, embedding and statistics, float32. Returns its path."""
+    """Writes `policy.msgpack`: the kernels of networks as float16, the rest as float32. Returns its path."""
     content = flax.serialization.to_state_dict({name: getattr(state, name) for name in state.policy_fields})
+    content = jax.device_get(content)
+    rounded = jax.tree.map(lambda leaf, half: leaf.astype(np.float16) if half else leaf, content, mark_kernels(content))
     path = folder / run_folder.POLICY_FILE
-    path.write_bytes(flax.serialization.msgpack_serialize(jax.device_get(content)))
+    path.write_bytes(flax.serialization.msgpack_serialize(rounded))
     return path
 
 
@@ -39,10 +42,15 @@ def read_policy(folder: pathlib.Path, template: TrainingState) -> TrainingState:
     check_architecture(shapes, template, str(path))
     empty = {name: getattr(template, name) for name in template.policy_fields}
     try:
-        policy = flax.serialization.from_state_dict(empty, jax.tree.map(jnp.asarray, fields))
+        policy = flax.serialization.from_state_dict(empty, jax.tree.map(_widen, fields))
     except ValueError as error:
         raise CheckpointError(f"{path}: another architecture ({one_line(error)})") from error
     return template.replace(**policy)
+
+
+def _widen(leaf: np.ndarray) -> jax.Array:
+    """What was written as float16, as float32."""
+    return jnp.asarray(leaf, jnp.float32) if leaf.dtype == np.float16 else jnp.asarray(leaf)
 
 
 def load_policy(folder: pathlib.Path, run: Experiment, best: bool = False) -> tuple[int, Any]:

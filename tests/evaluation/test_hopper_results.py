@@ -2,6 +2,9 @@ import dataclasses
 import json
 import shutil
 
+import flax.serialization
+import jax
+import numpy as np
 import pytest
 
 from hcp_jax import collect, sweep
@@ -63,8 +66,16 @@ def test_collected_results_come_from_the_run_folders(swept, collected):
 
 def test_a_published_policy_earns_what_its_run_earns(swept, collected):
     records = [evaluate_hoppers(folder / "with_s1", 1, 4) for folder in (swept / "runs", swept / "results" / "policies")]
-    assert records[0]["sets"] == records[1]["sets"]
-    assert set(records[0]["sets"]) == {"train", "heldout", "heldout_fitted"}
+    assert set(records[0]["sets"]) == set(records[1]["sets"]) == {"train", "heldout", "heldout_fitted"}
+    for name, one in records[0]["sets"].items():
+        assert records[1]["sets"][name] == pytest.approx(one, rel=1e-4)
+
+
+def test_a_published_policy_has_its_kernels_in_half_precision_and_all_else_in_full(swept, collected):
+    content = flax.serialization.msgpack_restore((swept / "results" / "policies" / "with_s1" / "policy.msgpack").read_bytes())
+    for path, leaf in jax.tree_util.tree_leaves_with_path(content):
+        if np.issubdtype(leaf.dtype, np.floating):
+            assert leaf.dtype == (np.float16 if path[-1].key == "kernel" else np.float32), path
 
 
 def test_a_damaged_policy_and_one_of_another_architecture_are_refused(swept, collected, tmp_path, capsys):
