@@ -48,9 +48,9 @@ def read_policy(folder: pathlib.Path, template: TrainingState) -> TrainingState:
     return template.replace(**policy)
 
 
-def _widen(leaf: np.ndarray) -> jax.Array:
+def _widen(leaf: np.ndarray | int) -> jax.Array:
     """What was written as float16, as float32."""
-    return jnp.asarray(leaf, jnp.float32) if leaf.dtype == np.float16 else jnp.asarray(leaf)
+    return jnp.asarray(leaf, jnp.float32) if np.asarray(leaf).dtype == np.float16 else jnp.asarray(leaf)
 
 
 def load_policy(folder: pathlib.Path, run: Experiment, best: bool = False) -> tuple[int, Any]:
