@@ -113,8 +113,9 @@ class DDPG:
             self.actor = JointActor(config.hidden_sizes, config.layer_norm)
             self.critic = JointCritic(config.hidden_sizes, config.layer_norm)
         else:
-            self.actor = DeterministicActor(config.hidden_sizes, env.action_size, config.layer_norm)
-            self.critic = Critic(config.hidden_sizes, config.layer_norm)
+            film_from = env.observation_size + env.goal_size if config.network == "film" else None
+            self.actor = DeterministicActor(config.hidden_sizes, env.action_size, config.layer_norm, film_from)
+            self.critic = Critic(config.hidden_sizes, config.layer_norm, film_from)
         self._num_iterations = num_iterations
         self._optimizer = make_ddpg_optimizer(config, num_iterations, embedding_learning_rate)
         self._explorer = Explorer(env, self._explored_action, config, num_envs)

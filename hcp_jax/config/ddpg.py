@@ -5,7 +5,7 @@ import dataclasses
 from hcp_jax.config.checks import is_at_least_zero, is_positive, require
 
 RELABEL_STRATEGIES = ("future", "final", "none")
-NETWORKS = ("flat", "joints")
+NETWORKS = ("flat", "film", "joints")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -15,8 +15,8 @@ class DDPGConfig:
 
     Attributes:
         preset: name of the set of values that this one started from.
-        network: `flat`, one vector through one actor and one critic (paper); or `joints`, layers shared by all joints, for the
-            encoding `chain_fk+jacobian`.
+        network: `flat`, one vector through one actor and one critic (paper); `film`, the same, where v_h also scales and
+            shifts the hidden layers; or `joints`, layers shared by all joints, for the encoding `chain_fk+jacobian`.
         hidden_sizes: widths of the hidden layers of actor and critic; the action enters the critic at the second. Of `joints`:
             the first is that of the layers over each joint, the others the critic's after them.
         actor_learning_rate, critic_learning_rate: Adam's steps.

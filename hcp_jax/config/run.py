@@ -125,6 +125,8 @@ class Config:
 
     def _check_ddpg(self) -> None:
         require(self.embedding.identify_steps == 0, "embedding.identify_steps", self.embedding.identify_steps, "0 for ddpg")
+        if self.ddpg.network == "film":
+            require(self.encoding != "none", "encoding", self.encoding, "one with features of the robot for ddpg.network=film")
         if self.ddpg.network == "joints":
             allowed = "chain_fk+jacobian"
             require(self.encoding == allowed, "encoding", self.encoding, f"{allowed} for ddpg.network=joints")

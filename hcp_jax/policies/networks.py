@@ -61,42 +61,69 @@ class ActorCritic(nn.Module):
         return self.act(obs, v_h), self.value(obs, v_h), predicted
 
 
+FILM_SIZE = 64  # numbers in which a network with FiLM sums up v_h
+
+
 class DeterministicActor(nn.Module):
-    """Actions in (-1, 1) from one vector: SELU layers, then tanh (paper, appendix, "Hyperparameters")."""
+    """Actions in (-1, 1) from one vector: SELU layers, then tanh (paper, appendix, "Hyperparameters").
+
+    Where `film_from` is not None, inputs from there on are v_h and what follows from it, and also scale and shift the hidden
+    layers after the first one (FiLM, Perez et al. 2018).
+    """
 
     hidden_sizes: Sequence[int]
     action_size: int
     layer_norm: bool = False
+    film_from: int | None = None
 
     @nn.compact
     def __call__(self, inputs: jax.Array) -> jax.Array:
-        x = inputs
+        x, summary = inputs, summarize_v_h(inputs, self.film_from, self.layer_norm)
         for i, size in enumerate(self.hidden_sizes):
-            x = selu_layer(x, size, f"hidden_{i}", self.layer_norm)
+            x = selu_layer(x, size, f"hidden_{i}", self.layer_norm, summary if i else None)
         init = nn.initializers.variance_scaling(1e-4, "fan_in", "truncated_normal")
         return jnp.tanh(nn.Dense(self.action_size, kernel_init=init, name="output")(x))
 
 
 class Critic(nn.Module):
-    """Action values: SELU layers, the action added at the second one (paper, appendix, "Hyperparameters"): [...]."""
+    """Action values: SELU layers, the action added at the second one (paper, appendix, "Hyperparameters"): [...].
+
+    `film_from` is that of `DeterministicActor`.
+    """
 
     hidden_sizes: Sequence[int]
     layer_norm: bool = False
+    film_from: int | None = None
 
     @nn.compact
     def __call__(self, inputs: jax.Array, action: jax.Array) -> jax.Array:
-        x = inputs
+        x, summary = inputs, summarize_v_h(inputs, self.film_from, self.layer_norm)
         for i, size in enumerate(self.hidden_sizes):
             x = jnp.concatenate([x, action], axis=-1) if i == 1 else x
-            x = selu_layer(x, size, f"hidden_{i}", self.layer_norm)
+            x = selu_layer(x, size, f"hidden_{i}", self.layer_norm, summary if i else None)
         init = nn.initializers.variance_scaling(1e-4, "fan_in", "truncated_normal")
         return nn.Dense(1, kernel_init=init, name="output")(x)[..., 0]
 
 
-def selu_layer(x: jax.Array, size: int, name: str, layer_norm: bool) -> jax.Array:
-    """A dense layer with SELU, and LayerNorm without scale and bias before it if asked. Call inside a compact module."""
+def selu_layer(x: jax.Array, size: int, name: str, layer_norm: bool, summary: jax.Array | None = None) -> jax.Array:
+    """A dense layer with SELU. Call inside a compact module.
+
+    Args:
+        layer_norm: LayerNorm without scale and bias before SELU.
+        summary: [..., FILM_SIZE], a linear function of which scales and shifts what SELU gets; at first not at all.
+    """
     x = nn.Dense(size, name=name)(x)
-    return nn.selu(nn.LayerNorm(use_scale=False, use_bias=False, name=f"{name}_norm")(x) if layer_norm else x)
+    x = nn.LayerNorm(use_scale=False, use_bias=False, name=f"{name}_norm")(x) if layer_norm else x
+    if summary is not None:
+        film = nn.Dense(2 * size, kernel_init=nn.initializers.zeros, name=f"{name}_film")(summary)
+        scale, shift = jnp.split(film, 2, axis=-1)
+        x = x * (1.0 + scale) + shift
+    return nn.selu(x)
+
+
+def summarize_v_h(inputs: jax.Array, film_from: int | None, layer_norm: bool) -> jax.Array | None:
+    """What scales and shifts a network's layers: [..., FILM_SIZE], or None. Call inside a compact module."""
+    return None if film_from is None else selu_layer(inputs[..., film_from:], FILM_SIZE, "hidden_v_h", layer_norm)
 
 
 class JointActor(nn.Module):

@@ -62,5 +62,5 @@ def test_the_action_of_each_joint_changes_its_value(obs):
 def test_they_need_the_encoding_that_has_joints():
     with pytest.raises(ConfigError, match="encoding='chain_fk'"):
         presets.arm("a", "reacher", "chain_fk", ddpg=DDPGConfig(network="joints"), pool=ArmPoolConfig(("I",), ()))
-    with pytest.raises(ConfigError, match=r"ddpg.network='graph': expected one of flat, joints"):
+    with pytest.raises(ConfigError, match=r"ddpg.network='graph': expected one of flat, film, joints"):
         DDPGConfig(network="graph")
