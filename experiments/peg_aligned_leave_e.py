@@ -1,8 +1,8 @@
-"""Exp. VII of the paper: peg insertion, fixed hole, type E left out; HCP-E, Jacobians, aligned joints. Preset: fast."""
+"""Exp. VII of the paper: peg insertion, type E left out; HCP-E, Jacobians and aligned joints. Preset: aligned_peg."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm("peg_aligned_leave_e", "peg_insertion", "chain_fk+jacobian", left_out="E", joint_slots="aligned")
+    return presets.aligned_peg("peg_aligned_leave_e", left_out="E")

@@ -1,8 +1,8 @@
-"""Exp. IX of the paper: peg insertion, fixed hole, type I left out; HCP-E, Jacobians, aligned joints. Preset: fast."""
+"""Exp. IX of the paper: peg insertion, type I left out; HCP-E, Jacobians and aligned joints. Preset: aligned_peg."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm("peg_aligned_leave_i", "peg_insertion", "chain_fk+jacobian", left_out="I", joint_slots="aligned")
+    return presets.aligned_peg("peg_aligned_leave_i", left_out="I")

@@ -1,15 +1,8 @@
-"""Exp. XIII of the paper: peg insertion, random hole, type E left out; HCP-E, Jacobians, aligned joints. Preset: fast."""
+"""Exp. XIII of the paper: random hole, type E left out; HCP-E, Jacobians, aligned joints. Preset: aligned_peg."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm(
-        "random_peg_aligned_leave_e",
-        "peg_insertion",
-        "chain_fk+jacobian",
-        left_out="E",
-        random_hole=presets.RANDOM_HOLE,
-        joint_slots="aligned",
-    )
+    return presets.aligned_peg("random_peg_aligned_leave_e", left_out="E", random_hole=presets.RANDOM_HOLE)

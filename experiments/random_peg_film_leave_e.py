@@ -1,18 +1,8 @@
-"""Exp. XIII of the paper, where v_h and its features also scale and shift the hidden layers (FiLM). Preset: fast."""
-
-import dataclasses
+"""Exp. XIII of the paper, where v_h and its features also scale and shift the hidden layers (FiLM). Preset: aligned_peg."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm(
-        "random_peg_film_leave_e",
-        "peg_insertion",
-        "chain_fk+jacobian",
-        left_out="E",
-        random_hole=presets.RANDOM_HOLE,
-        joint_slots="aligned",
-        ddpg=dataclasses.replace(presets.FAST_PEG_DDPG, network="film"),
-    )
+    return presets.aligned_peg("random_peg_film_leave_e", left_out="E", random_hole=presets.RANDOM_HOLE, network="film")

@@ -1,4 +1,4 @@
-"""Fine-tuning Exp. XI: HCP-E that never saw type H goes on with type H alone. Preset: fast.
+"""Fine-tuning Exp. XI: HCP-E that never saw type H goes on with type H alone. Preset: aligned_peg.
 
 Set `--config.init=runs/random_peg_aligned_leave_h` to another run folder; `--config.init=` trains the same from scratch.
 """
@@ -8,12 +8,9 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm(
+    return presets.aligned_peg(
         "random_peg_finetune_h",
-        "peg_insertion",
-        "chain_fk+jacobian",
         random_hole=presets.RANDOM_HOLE,
-        joint_slots="aligned",
         pool=presets.only("H"),
         init="runs/random_peg_aligned_leave_h",
         init_layers="all",

@@ -1,4 +1,4 @@
-"""Fine-tuning Exp. XV: HCP-E that never saw type I goes on with type I alone. Preset: fast.
+"""Fine-tuning Exp. XV: HCP-E that never saw type I goes on with type I alone. Preset: aligned_peg.
 
 Set `--config.init=runs/random_peg_aligned_leave_i` to another run folder; `--config.init=` trains the same from scratch.
 """
@@ -8,12 +8,9 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm(
+    return presets.aligned_peg(
         "random_peg_finetune_i",
-        "peg_insertion",
-        "chain_fk+jacobian",
         random_hole=presets.RANDOM_HOLE,
-        joint_slots="aligned",
         pool=presets.only("I"),
         init="runs/random_peg_aligned_leave_i",
         init_layers="all",
