@@ -133,7 +133,11 @@ def _describe_presets() -> str:
             before, after = getattr(paper, field.name), getattr(fast, field.name)
             if before != after and field.name != "preset":
                 rows.append([task, f"`{path}.{field.name}`", f"`{before!r}`", f"`{after!r}`"])
-    text = "The experiments use the preset `fast`; `hcp_jax/presets.py` says why it differs from the paper's values."
+    small = ", ".join(f"`ddpg.{name}` {value}" for name, value in presets.SMALL_BATCHES.items())
+    text = (
+        "The experiments use the preset `fast`; `hcp_jax/presets.py` says why it differs from the paper's values. HCP-E with "
+        f"aligned joints and `experiments/finetune.py` train in small batches: {small}."
+    )
     return f"## Presets\n\n{text}\n\n{_table(['task', 'field', 'paper', 'fast'], rows)}"
 
 
