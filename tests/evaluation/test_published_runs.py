@@ -20,7 +20,6 @@ LARGE_BATCHES = (
 )
 OLDER = {
     "peg_aligned_leave_e_s0": LARGE_BATCHES,
-    "peg_aligned_leave_h_s0": LARGE_BATCHES,
     "peg_aligned_leave_i_s0": LARGE_BATCHES,
     "random_peg_aligned_leave_e_s0": LARGE_BATCHES,
     "random_peg_aligned_leave_i_s0": LARGE_BATCHES,
