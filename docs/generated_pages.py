@@ -135,8 +135,8 @@ def _describe_presets() -> str:
                 rows.append([task, f"`{path}.{field.name}`", f"`{before!r}`", f"`{after!r}`"])
     small = ", ".join(f"`ddpg.{name}` {value}" for name, value in presets.SMALL_BATCHES.items())
     text = (
-        "The experiments use the preset `fast`; `hcp_jax/presets.py` says why it differs from the paper's values. HCP-E with "
-        f"aligned joints and `experiments/finetune.py` train in small batches: {small}."
+        "The experiments use the preset `fast`; `hcp_jax/presets.py` says why it differs from the paper's values. The "
+        f"reacher with aligned joints and `experiments/finetune.py` train in small batches: {small}."
     )
     return f"## Presets\n\n{text}\n\n{_table(['task', 'field', 'paper', 'fast'], rows)}"
 

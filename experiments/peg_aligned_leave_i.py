@@ -1,4 +1,4 @@
-"""Exp. IX of the paper: peg insertion, type I left out; HCP-E, Jacobians and aligned joints. Preset: aligned_peg."""
+"""Exp. IX of the paper: peg insertion, type I left out; HCP-E, Jacobians and aligned joints. Preset: fast."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config

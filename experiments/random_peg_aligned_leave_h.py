@@ -1,4 +1,4 @@
-"""Exp. XI of the paper: random hole, type H left out; HCP-E, Jacobians, aligned joints. Preset: aligned_peg."""
+"""Exp. XI of the paper: random hole, type H left out; HCP-E, Jacobians, aligned joints. Preset: fast."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config

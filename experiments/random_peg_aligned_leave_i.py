@@ -1,4 +1,4 @@
-"""Exp. XV of the paper: random hole, type I left out; HCP-E, Jacobians, aligned joints. Preset: aligned_peg."""
+"""Exp. XV of the paper: random hole, type I left out; HCP-E, Jacobians, aligned joints. Preset: fast."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config

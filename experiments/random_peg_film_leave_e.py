@@ -1,4 +1,4 @@
-"""Exp. XIII of the paper, where v_h and its features also scale and shift the hidden layers (FiLM). Preset: aligned_peg."""
+"""Exp. XIII of the paper, where v_h and its features also scale and shift the hidden layers (FiLM). Preset: fast."""
 
 from hcp_jax import presets
 from hcp_jax.config import Config

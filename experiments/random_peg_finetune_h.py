@@ -1,4 +1,4 @@
-"""Fine-tuning Exp. XI: HCP-E that never saw type H goes on with type H alone. Preset: aligned_peg.
+"""Fine-tuning Exp. XI: HCP-E that never saw type H goes on with type H alone. Preset: fast.
 
 Set `--config.init=runs/random_peg_aligned_leave_h` to another run folder; `--config.init=` trains the same from scratch.
 """

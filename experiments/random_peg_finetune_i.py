@@ -1,4 +1,4 @@
-"""Fine-tuning Exp. XV: HCP-E that never saw type I goes on with type I alone. Preset: aligned_peg.
+"""Fine-tuning Exp. XV: HCP-E that never saw type I goes on with type I alone. Preset: fast.
 
 Set `--config.init=runs/random_peg_aligned_leave_i` to another run folder; `--config.init=` trains the same from scratch.
 """

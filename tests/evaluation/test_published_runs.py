@@ -14,15 +14,7 @@ RUNS = sorted(path.parent for task in ("arms", "hopper") for path in (ROOT / "re
 # What may differ in every run: its seed, where the policy that it starts from lay, and the name that a folder's may refine.
 FREE = {"seed", "init", "name"}
 # Runs of other settings than their experiment's: why, and in which fields.
-LARGE_BATCHES = (
-    "trained before HCP-E on the peg had small batches",
-    {"ddpg.batch_size", "ddpg.updates_per_iteration", "ddpg.tau"},
-)
 OLDER = {
-    "peg_aligned_leave_e_s0": LARGE_BATCHES,
-    "peg_aligned_leave_i_s0": LARGE_BATCHES,
-    "random_peg_aligned_leave_e_s0": LARGE_BATCHES,
-    "random_peg_aligned_leave_i_s0": LARGE_BATCHES,
     "peg_hcpe_leave_h_s0": (
         "trained before the peg's preset had five-step returns, more episodes of arms that fail and larger steps",
         {
