@@ -27,7 +27,7 @@ def one_arm() -> RobotPool:
     ("encoding", "actor"),
     [
         ("chain+dynamics", DeterministicActor((8, 8), 7)),
-        ("chain_fk+jacobian+dynamics", DeterministicActor((8, 8), 7)),
+        ("chain_fk+jacobian+dynamics", DeterministicActor((8, 8), 7, layer_norm=True, film_from=17)),
         pytest.param("chain_fk+jacobian", JointActor((8, 8), layer_norm=True), marks=pytest.mark.slow),
     ],
 )
