@@ -161,8 +161,6 @@ def quick_reacher(name: str, left_out: str, **changes) -> Config:
     return arm(name, "reacher", "chain_fk", left_out=left_out, joint_slots="aligned", **(schedule | changes))
 
 
-def aligned_peg(name: str, left_out: str = "", random_hole: float = 0.0, network: str = "flat", **changes) -> Config:
-    """HCP-E on the peg: Jacobians and aligned joints. `changes` are fields of `Config`."""
-    ddpg = dataclasses.replace(FAST_PEG_DDPG, network=network)
-    settings = {"left_out": left_out, "random_hole": random_hole, "joint_slots": "aligned", "ddpg": ddpg}
-    return arm(name, "peg_insertion", "chain_fk+jacobian", **(settings | changes))
+def aligned_peg(name: str, **changes) -> Config:
+    """HCP-E on the peg: Jacobians and aligned joints. `changes` are those of `arm`."""
+    return arm(name, "peg_insertion", "chain_fk+jacobian", joint_slots="aligned", **changes)
