@@ -5,4 +5,11 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm("peg_low_damping_ddpg", "peg_insertion", "none", pool=presets.only_dynamics(damping=(0.01, 2.0)))
+    return presets.arm(
+        "peg_low_damping_ddpg",
+        "peg_insertion",
+        "none",
+        pool=presets.only_dynamics(damping=(0.01, 2.0)),
+        total_env_steps=2_560_000,  # one type is learned in fewer
+        eval_every=256_000,
+    )

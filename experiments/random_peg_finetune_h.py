@@ -1,6 +1,6 @@
-"""Fine-tuning Exp. XI: HCP-E that never saw type H goes on with type H alone. Preset: fast.
+"""Fine-tuning Exp. XI: HCP-E that never saw type H goes on with type H alone. Preset: fast, smaller steps.
 
-Set `--config.init=runs/random_peg_aligned_leave_h` to another run folder; `--config.init=` trains the same from scratch.
+`--config.init=FOLDER` names another run or policy to start from; `random_peg_finetune_h_scratch.py` starts from none.
 """
 
 from hcp_jax import presets
@@ -8,10 +8,4 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.aligned_peg(
-        "random_peg_finetune_h",
-        random_hole=presets.RANDOM_HOLE,
-        pool=presets.only("H"),
-        init="runs/random_peg_aligned_leave_h",
-        init_layers="all",
-    )
+    return presets.finetune_peg("random_peg_finetune_h", "H", init="results/policies/random_peg_aligned_leave_h_s0")

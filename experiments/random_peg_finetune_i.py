@@ -1,6 +1,6 @@
-"""Fine-tuning Exp. XV: HCP-E that never saw type I goes on with type I alone. Preset: fast.
+"""Fine-tuning Exp. XV: HCP-E that never saw type I goes on with type I alone. Preset: fast, smaller steps.
 
-Set `--config.init=runs/random_peg_aligned_leave_i` to another run folder; `--config.init=` trains the same from scratch.
+`--config.init=FOLDER` names another run or policy to start from; `random_peg_finetune_i_scratch.py` starts from none.
 """
 
 from hcp_jax import presets
@@ -8,10 +8,4 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.aligned_peg(
-        "random_peg_finetune_i",
-        random_hole=presets.RANDOM_HOLE,
-        pool=presets.only("I"),
-        init="runs/random_peg_aligned_leave_i",
-        init_layers="all",
-    )
+    return presets.finetune_peg("random_peg_finetune_i", "I", init="results/policies/random_peg_aligned_leave_i_s0")

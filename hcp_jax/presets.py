@@ -164,3 +164,22 @@ def quick_reacher(name: str, left_out: str, **changes) -> Config:
 def aligned_peg(name: str, **changes) -> Config:
     """HCP-E on the peg: Jacobians and aligned joints. `changes` are those of `arm`."""
     return arm(name, "peg_insertion", "chain_fk+jacobian", joint_slots="aligned", **changes)
+
+
+def scratch_peg(name: str, robot_type: str, **changes) -> Config:
+    """Peg insertion into a random hole with arms of one type alone, from the start. `changes` are those of `arm`."""
+    schedule = {"total_env_steps": 3_840_000, "eval_every": 128_000}
+    return aligned_peg(name, **({"random_hole": RANDOM_HOLE, "pool": only(robot_type)} | schedule | changes))
+
+
+def finetune_peg(name: str, robot_type: str, init: str) -> Config:
+    """The same from the policy in folder `init`, in a third of the steps."""
+    ddpg = dataclasses.replace(
+        FAST_PEG_DDPG,
+        actor_learning_rate=1e-4,
+        critic_learning_rate=3e-4,
+        warmup_episodes=0,
+        n_step_from=0.0,  # it need not be tempted to try: it knows where to go
+        actor_average=0.8,
+    )
+    return scratch_peg(name, robot_type, total_env_steps=1_280_000, init=init, init_layers="all", ddpg=ddpg)

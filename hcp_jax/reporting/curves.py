@@ -97,12 +97,7 @@ def make_finetuning(published: Published, letter: str, name: str) -> Item:
     figures = (Figure(draw_curves(lines, LABEL, LIMITS), f"New arms of type {letter}.", files),) if lines else ()
     is_pair = [line.encoding for line in lines] == ["none", "chain_fk"]
     tables = (compare_to_scratch(lines[0].curve, lines[1].curve, files),) if is_pair else ()
-    train = f"python -m hcp_jax.train --config experiments/{name}.py --out runs/arms"
-    commands = (
-        f"{train}/{name}_s0 --config.init=results/policies/random_peg_aligned_leave_{letter.lower()}_s0",
-        f"{train}/{scratch_name}_s0 --config.name={scratch_name} --config.init=",
-        RESULTS_COMMANDS[1],
-    )
+    commands = (*train_commands([name, scratch_name]), RESULTS_COMMANDS[1])
     experiment = next(s.experiment for s in SETTINGS if s.prefix == "random_peg" and s.left_out == letter)
     return Item(f"Type {letter}, from Exp. {roman(experiment)}", "", tables, figures, commands)
 
