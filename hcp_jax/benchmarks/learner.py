@@ -20,7 +20,7 @@ from hcp_jax.algorithms.replay import replay_bytes
 from hcp_jax.benchmarks.matmuls import Products, count_products, make_bare_products, total_flops
 from hcp_jax.benchmarks.physics import time_steps
 from hcp_jax.config import Config
-from hcp_jax.devices import replicate
+from hcp_jax.devices import options_for_batch, replicate
 from hcp_jax.experiment.arm import ArmExperiment
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.experiment.hopper import HopperExperiment
@@ -54,7 +54,8 @@ def benchmark_learner(config: Config, seconds: float) -> list[dict]:
     one, two = (count_products(*with_passes(run, number), jnp.int32(1)) for number in (1, 2))
     products: Products = two - one
     flops, update = total_flops(products) / updates_per_pass, each_pass / updates_per_pass
-    bare = 1.0 / time_steps(make_bare_products(products), seconds)[0] / updates_per_pass
+    options = options_for_batch(batch_size) if isinstance(run, ArmExperiment) else None
+    bare = 1.0 / time_steps(make_bare_products(products, options), seconds)[0] / updates_per_pass
 
     def collecting_row(name: str, duration: float) -> dict:
         speed = round(config.batch_size / duration, 1)

@@ -1,6 +1,8 @@
 """The bound of a learner: the matrix products of its updates and nothing else."""
 
 import collections
+import functools
+import inspect
 import math
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -30,7 +32,8 @@ Products = collections.Counter  # of Product
 def count_products(function: Callable, *args) -> Products:
     """The matrix products in one call of `function`: bodies of scans as often as they run, those of `while` loops once."""
     counts: Products = collections.Counter()
-    for product, repeats in walk(jax.make_jaxpr(function)(*args).jaxpr, 1):
+    traced = jax.make_jaxpr(inspect.unwrap(function))  # a jitted function with compiler options cannot be traced inside another
+    for product, repeats in walk(traced(*args).jaxpr, 1):
         counts[product] += repeats
     return counts
 
@@ -48,12 +51,12 @@ def walk(jaxpr: Any, repeats: int) -> Iterator[tuple[Product, int]]:
                     yield from walk(value, inner)
 
 
-def make_bare_products(products: Products) -> Callable[[int], None]:
-    """A function that computes all of `products` n times on random arrays."""
+def make_bare_products(products: Products, compiler_options: dict[str, bool] | None = None) -> Callable[[int], None]:
+    """A function that computes all of `products` n times on random arrays, compiled as what they are the bound of."""
     key = jax.random.key(0)
     sides = [(jax.random.normal(key, product.left), jax.random.normal(key, product.right)) for product in products]
 
-    @jax.jit
+    @functools.partial(jax.jit, compiler_options=compiler_options)
     def compute(sides, count):
         def once(_, carry):
             # Each side depends on the result before, or the loop would be computed once.

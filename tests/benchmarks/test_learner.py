@@ -10,7 +10,12 @@ from hcp_jax import benchmark
     [
         (
             "presets.arm('a', 'reacher', 'chain_fk', num_envs=4, pool=ArmPoolConfig(('I',), (), 2))",
-            ["--config.ddpg.updates_per_iteration=20", "--config.env.episode_length=10", "--config.ddpg.buffer_episodes=8"],
+            [  # in batches so small that a CPU gives them one thread
+                "--config.ddpg.updates_per_iteration=20",
+                "--config.ddpg.batch_size=128",
+                "--config.env.episode_length=10",
+                "--config.ddpg.buffer_episodes=8",
+            ],
         ),
         pytest.param(
             "presets.hopper('a', 'kinematics', num_envs=8, pool=HopperPoolConfig(num_robots=4))",
