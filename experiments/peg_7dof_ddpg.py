@@ -5,4 +5,4 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm("peg_7dof_ddpg", "peg_insertion", "none", pool=presets.only("I"))
+    return presets.type_i("peg_7dof_ddpg", "peg_insertion", "none", presets.only("I"))

@@ -5,4 +5,4 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm("peg_7dof_hcpi", "peg_insertion", "embedding", pool=presets.only("I"))
+    return presets.type_i("peg_7dof_hcpi", "peg_insertion", "embedding", presets.only("I"))

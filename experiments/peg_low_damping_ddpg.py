@@ -5,11 +5,4 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm(
-        "peg_low_damping_ddpg",
-        "peg_insertion",
-        "none",
-        pool=presets.only_dynamics(damping=(0.01, 2.0)),
-        total_env_steps=2_560_000,  # one type is learned in fewer
-        eval_every=256_000,
-    )
+    return presets.type_i("peg_low_damping_ddpg", "peg_insertion", "none", presets.only_dynamics(damping=(0.01, 2.0)))

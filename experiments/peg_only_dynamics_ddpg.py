@@ -5,4 +5,4 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm("peg_only_dynamics_ddpg", "peg_insertion", "none", pool=presets.only_dynamics())
+    return presets.type_i("peg_only_dynamics_ddpg", "peg_insertion", "none", presets.only_dynamics())

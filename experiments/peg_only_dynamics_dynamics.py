@@ -5,4 +5,4 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm("peg_only_dynamics_dynamics", "peg_insertion", "dynamics", pool=presets.only_dynamics())
+    return presets.type_i("peg_only_dynamics_dynamics", "peg_insertion", "dynamics", presets.only_dynamics())

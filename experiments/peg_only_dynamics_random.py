@@ -5,4 +5,4 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm("peg_only_dynamics_random", "peg_insertion", "random", pool=presets.only_dynamics())
+    return presets.type_i("peg_only_dynamics_random", "peg_insertion", "random", presets.only_dynamics())

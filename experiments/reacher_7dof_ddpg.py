@@ -5,4 +5,4 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm("reacher_7dof_ddpg", "reacher", "none", pool=presets.only("I"))
+    return presets.type_i("reacher_7dof_ddpg", "reacher", "none", presets.only("I"))

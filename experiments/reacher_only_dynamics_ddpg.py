@@ -5,4 +5,4 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.arm("reacher_only_dynamics_ddpg", "reacher", "none", pool=presets.only_dynamics())
+    return presets.type_i("reacher_only_dynamics_ddpg", "reacher", "none", presets.only_dynamics())

@@ -151,6 +151,19 @@ def arm(
     return dataclasses.replace(config, **changes)
 
 
+def type_i(name: str, task: str, encoding: str, pool: ArmPoolConfig) -> Config:
+    """An arm experiment on type I alone (paper, appendix), which is learned in fewer steps than eight types."""
+    schedules = {
+        "reacher": {
+            "total_env_steps": 1_280_000,
+            "eval_every": 128_000,
+            "ddpg": dataclasses.replace(FAST_DDPG, **SMALL_BATCHES),
+        },
+        "peg_insertion": {"total_env_steps": 2_560_000, "eval_every": 256_000},
+    }
+    return arm(name, task, encoding, pool=pool, **schedules[task])
+
+
 def quick_reacher(name: str, left_out: str, **changes) -> Config:
     """The reacher with `chain_fk`, aligned joints and small batches. `changes` are fields of `Config`."""
     schedule = {
