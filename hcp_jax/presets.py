@@ -179,6 +179,12 @@ def aligned_peg(name: str, **changes) -> Config:
     return arm(name, "peg_insertion", "chain_fk+jacobian", joint_slots="aligned", **changes)
 
 
+def film_peg(name: str, **changes) -> Config:
+    """`aligned_peg` with FiLM. On types that it was not trained on, an actor is far worse than the mean of itself over many
+    iterations, and that of 20 worse than that of 60 (docs/reproducing.md)."""
+    return aligned_peg(name, ddpg=dataclasses.replace(FAST_PEG_DDPG, network="film", actor_average=0.98), **changes)
+
+
 def scratch_peg(name: str, robot_type: str, **changes) -> Config:
     """Peg insertion into a random hole with arms of one type alone, from the start. `changes` are those of `arm`."""
     schedule = {"total_env_steps": 3_840_000, "eval_every": 128_000}

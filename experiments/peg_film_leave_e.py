@@ -1,0 +1,8 @@
+"""Exp. VII of the paper: peg insertion, fixed hole, type E left out; HCP-E, Jacobians, aligned joints, FiLM. Preset: fast."""
+
+from hcp_jax import presets
+from hcp_jax.config import Config
+
+
+def get_config() -> Config:
+    return presets.film_peg("peg_film_leave_e", left_out="E")

@@ -1,0 +1,8 @@
+"""Exp. XV of the paper: random hole, type I left out; HCP-E, Jacobians, aligned joints, FiLM. Preset: fast."""
+
+from hcp_jax import presets
+from hcp_jax.config import Config
+
+
+def get_config() -> Config:
+    return presets.film_peg("random_peg_film_leave_i", left_out="I", random_hole=presets.RANDOM_HOLE)
