@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Protocol
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import optax
 from brax.training.acme import running_statistics, specs
 from flax import struct
@@ -49,7 +50,9 @@ class NetworkInputs(Protocol):
     size: int
 
     def init(self, key: jax.Array) -> jax.Array | None: ...
-    def inputs(self, embedding: jax.Array | None, index: jax.Array, obs: jax.Array, goal: jax.Array) -> jax.Array: ...
+    def inputs(self, embedding: jax.Array | None, index: jax.Array, obs: jax.Array, goal: jax.Array) -> jax.Array:
+        """Observation, goal, and whatever else: [B, size]."""
+        ...
 
 
 @struct.dataclass
@@ -166,11 +169,17 @@ class DDPG:
         return self._act(params["actor"], self.normalize(inputs, statistics))
 
     def normalize(self, inputs: jax.Array, statistics: running_statistics.RunningStatisticsState) -> jax.Array:
-        """The inputs as the networks see them: 0 for those that never varied in training, of whatever arm this one is."""
+        """The inputs as the networks see them: 0 for those that never varied in training, of whatever arm this one is.
+
+        But for the goal: where all episodes have the same one, it is those of hindsight that differ from it, by metres.
+        """
         if not self.config.normalize_inputs:
             return inputs
         varied = statistics.std > MIN_STD
-        return jnp.where(varied, running_statistics.normalize(inputs, statistics, max_abs_value=5.0), 0.0)
+        place = np.arange(inputs.shape[-1]) - self.env.observation_size
+        is_goal = (place >= 0) & (place < self.env.goal_size)
+        unscaled = jnp.where(is_goal, inputs - statistics.mean, 0.0)
+        return jnp.where(varied, running_statistics.normalize(inputs, statistics, max_abs_value=5.0), unscaled)
 
     def _train(self, state: DDPGState, num_iterations: jax.Array) -> DDPGState:
         return put_everywhere(jax.lax.fori_loop(0, num_iterations, lambda _, s: self._train_iteration(s), state))

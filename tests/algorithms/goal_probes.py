@@ -11,20 +11,21 @@ REACH = 0.15
 class PlaneEnv:
     """Robot i moves by 0.25 * action turned by turns[i] [rad]; goals lie on the circle of radius 1, success is within `REACH`.
 
-    With `diverging`, robot 0's physics fails after its second step.
+    With `same_goal`, it is (1, 0) in every episode. With `diverging`, robot 0's physics fails after its second step.
     """
 
     observation_size = goal_size = action_size = 2
 
-    def __init__(self, turns: tuple[float, ...], episode_length: int = 10, diverging: bool = False):
+    def __init__(self, turns: tuple[float, ...], episode_length: int = 10, diverging: bool = False, same_goal: bool = False):
         cosine, sine = jnp.cos(jnp.asarray(turns)), jnp.sin(jnp.asarray(turns))
         self._rotations = jnp.stack([jnp.stack([cosine, -sine], -1), jnp.stack([sine, cosine], -1)], -2)
         self.num_robots, self.episode_length, self.diverging = len(turns), episode_length, diverging
+        self.max_angle = 0.0 if same_goal else 2 * jnp.pi
 
     def reset(self, key: jax.Array, index: jax.Array) -> GoalState:
         key, key_goal = jax.random.split(key)
         position = jnp.zeros((index.shape[0], 2))
-        angle = jax.random.uniform(key_goal, index.shape, maxval=2 * jnp.pi)
+        angle = jax.random.uniform(key_goal, index.shape, maxval=self.max_angle)
         goal = jnp.stack([jnp.cos(angle), jnp.sin(angle)], axis=-1)
         return GoalState(jnp.zeros(index.shape, jnp.int32), index, position, position, goal, key)
 

@@ -26,8 +26,8 @@ CONFIG = DDPGConfig(
 )
 
 
-def make(turns=(0.0,), learned=False, diverging=False, **changes) -> DDPG:
-    env = PlaneEnv(turns, diverging=diverging)
+def make(turns=(0.0,), learned=False, diverging=False, same_goal=False, **changes) -> DDPG:
+    env = PlaneEnv(turns, diverging=diverging, same_goal=same_goal)
     config = dataclasses.replace(CONFIG, **changes)
     return DDPG(env, PlaneInputs(len(turns), learned), config, num_envs=10, num_iterations=40, embedding_learning_rate=3e-3)
 
@@ -196,6 +196,16 @@ def test_an_input_that_never_varied_in_training_is_not_seen_by_the_networks():
     seen, of_another_robot = (learner.normalize(x, statistics) for x in (inputs, inputs.at[:, 0].set(0.4)))
     np.testing.assert_array_equal(seen, of_another_robot)
     np.testing.assert_allclose(seen[:, 1:].std(axis=0), 1.0, atol=0.1)
+
+
+def test_goals_of_hindsight_are_seen_where_every_episode_has_the_same_goal():
+    learner = make(normalize_inputs=True, same_goal=True)
+    state = trained(learner)
+    assert float(state.statistics.std[2:].max()) < 1e-5, "the goal did not vary"
+    inputs = jnp.asarray([[0.5, 0.0, 1.0, 0.0], [0.5, 0.0, 0.6, 0.3]])
+    seen = learner.normalize(inputs, state.statistics)
+    np.testing.assert_allclose(seen[:, 2:], [[0.0, 0.0], [-0.4, 0.3]], atol=1e-6)
+    assert success_rate(learner, state) > 0.9
 
 
 @pytest.mark.parametrize(
