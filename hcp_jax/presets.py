@@ -151,17 +151,22 @@ def arm(
     return dataclasses.replace(config, **changes)
 
 
-def type_i(name: str, task: str, encoding: str, pool: ArmPoolConfig) -> Config:
-    """An arm experiment on type I alone (paper, appendix), which is learned in fewer steps than eight types."""
+def type_i(name: str, task: str, encoding: str, pool: ArmPoolConfig, **changes) -> Config:
+    """An arm experiment on type I alone (paper, appendix), which is learned in fewer steps than eight types. Carrying over to
+    others does not count here, so batches are small. `changes` are fields of `Config`."""
     schedules = {
         "reacher": {
             "total_env_steps": 1_280_000,
             "eval_every": 128_000,
             "ddpg": dataclasses.replace(FAST_DDPG, **SMALL_BATCHES),
         },
-        "peg_insertion": {"total_env_steps": 2_560_000, "eval_every": 256_000},
+        "peg_insertion": {
+            "total_env_steps": 2_560_000,
+            "eval_every": 128_000,
+            "ddpg": dataclasses.replace(FAST_PEG_DDPG, **SMALL_BATCHES),
+        },
     }
-    return arm(name, task, encoding, pool=pool, **schedules[task])
+    return arm(name, task, encoding, pool=pool, **(schedules[task] | changes))
 
 
 def quick_reacher(name: str, left_out: str, **changes) -> Config:
