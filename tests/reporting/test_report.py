@@ -161,7 +161,7 @@ def test_the_appendix_tables_show_ours_and_the_papers_figures(committed):
     ours = [row for row in json.loads((ROOT / "results" / "appendix.json").read_text()) if row["test_type"] in PAPER_TYPES]
     for row in ours:
         if row["experiment"]:
-            inputs = row["encoding"] + (", aligned joints" if row["joint_slots"] == "aligned" else "")
+            inputs = name_inputs(row["encoding"], row["joint_slots"], row["network"])
             cells = by_experiment[roman(row["experiment"]), inputs, "ours"]
             shown = cells[PAPER_TYPES.index(row["test_type"])]
             assert shown == spread(row["success_mean"], row["success_std_over_trials"])
