@@ -21,7 +21,20 @@ from hcp_jax.reporting.settings import (
 
 COMMANDS = (*RESULTS_COMMANDS, EVALUATE_COMMAND.format(name="POLICY"), TABLES_COMMAND)
 ALGORITHMS = ("HCP-E", "DDPG+HER")  # of the paper's pairs
-MEASUREMENTS = ("seeds", "std over seeds", "of reachable goals [%]", "control steps [M]", "minutes")
+# What a phone shows without scrolling comes first.
+MEASUREMENTS = (
+    "ours [%]",
+    "paper [%]",
+    "difference",
+    "algorithm",
+    "v_h",
+    "trained on",
+    "seeds",
+    "std over seeds",
+    "of reachable goals [%]",
+    "control steps [M]",
+    "minutes",
+)
 NOT_RUN, NOT_EVALUATED = "not run", "not evaluated"
 
 
@@ -47,7 +60,7 @@ def table_sections(published: Published) -> tuple[Section, ...]:
 
 def make_table1(published: Published, rows: Sequence[TableRow]) -> Item:
     """The sixteen experiments in the paper's order; an experiment with several v_h has a row for each."""
-    columns = ("Exp.", "tested on", "algorithm", "v_h", "ours [%]", "paper [%]", "difference", "trained on", *MEASUREMENTS)
+    columns = ("Exp.", "tested on", *MEASUREMENTS)
     lines: dict[str, list[Row]] = {task: [] for task in TASKS}
     for setting in SETTINGS:
         trained = letters(name for name in PAPER_TYPES if name != setting.left_out)
@@ -55,16 +68,16 @@ def make_table1(published: Published, rows: Sequence[TableRow]) -> Item:
             experiment = setting.experiment + number
             first = (roman(experiment), setting.left_out)
             measured = [row for row in rows if row.experiment == experiment]
-            lines[setting.task] += [Row((*first, row.algorithm, inputs_of(row), *measurements(row))) for row in measured]
+            lines[setting.task] += [Row((*first, *measurements(row))) for row in measured]
             if not measured:
                 steps = describe_progress(published, name)
                 state = NOT_EVALUATED if steps else NOT_RUN
-                cells = (algorithm, "", state, spread(*setting.paper[number]), "", trained, "", "", "", steps, "")
+                cells = (state, spread(*setting.paper[number]), "", algorithm, "", trained, "", "", "", steps, "")
                 command = f"python -m hcp_jax.train --config experiments/{name}.py"
                 lines[setting.task].append(Row((*first, *cells, command), "missing"))
     files = source(published, rows, "table1.json")
     tables = tuple(
-        Table(capitalise(task), (*columns, "policies, or training"), "llllrrrlrrrrrc", tuple(lines[task]), files)
+        Table(capitalise(task), (*columns, "policies, or training"), "llrrrlllrrrrrc", tuple(lines[task]), files)
         for task in TASKS
     )
     text = "Minutes are the time of one training. The record of a policy is results/arms/evaluations/POLICY.json."
@@ -73,14 +86,12 @@ def make_table1(published: Published, rows: Sequence[TableRow]) -> Item:
 
 def make_controls(published: Published, rows: Sequence[TableRow]) -> Item:
     """Ours alone: what the end effector's position explains without any hardware."""
-    columns = ("task", "tested on", "algorithm", "v_h", "ours [%]", "paper [%]", "difference", "trained on", *MEASUREMENTS)
+    columns = ("task", "tested on", *MEASUREMENTS)
     lines = tuple(
-        Row((row.task.replace("_", " "), row.test_type, row.algorithm, inputs_of(row), *measurements(row)))
-        for row in rows
-        if row.experiment is None
+        Row((row.task.replace("_", " "), row.test_type, *measurements(row))) for row in rows if row.experiment is None
     )
     files = source(published, rows, "table1.json")
-    table = Table("Controls", (*columns, "policies"), "llllrrrlrrrrrc", lines, files)
+    table = Table("Controls", (*columns, "policies"), "llrrrlllrrrrrc", lines, files)
     text = (
         "DDPG+HER that sees the end effector's position, or its offset from the goal, and no v_h: how much of the gain is the "
         "position rather than the hardware."
@@ -90,11 +101,13 @@ def make_controls(published: Published, rows: Sequence[TableRow]) -> Item:
 
 
 def measurements(row: TableRow) -> tuple[str, ...]:
-    """Ours, paper's, difference, types trained on, `MEASUREMENTS`, policies."""
+    """`MEASUREMENTS`, and the policies."""
     return (
         spread(row.success_mean, row.success_std_over_trials),
         spread(row.paper_mean, row.paper_std),
         difference(row.success_mean, row.paper_mean),
+        row.algorithm,
+        inputs_of(row),
         letters(row.train_types),
         str(len(row.seeds)),
         decimals(row.success_std_over_seeds),
