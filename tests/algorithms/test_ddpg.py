@@ -1,4 +1,5 @@
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -26,7 +27,9 @@ CONFIG = DDPGConfig(
 )
 
 
+@functools.cache
 def make(turns=(0.0,), learned=False, diverging=False, same_goal=False, **changes) -> DDPG:
+    """One learner, compiled once, for every test that asks for the same."""
     env = PlaneEnv(turns, diverging=diverging, same_goal=same_goal)
     config = dataclasses.replace(CONFIG, **changes)
     return DDPG(env, PlaneInputs(len(turns), learned), config, num_envs=10, num_iterations=40, embedding_learning_rate=3e-3)
@@ -162,7 +165,7 @@ def test_the_target_takes_the_smaller_value_of_two_critics():
 
 
 def test_what_the_actor_says_of_a_missing_joint_changes_nothing(monkeypatch):
-    learner = make(warmup_episodes=1000)
+    learner = make.__wrapped__(warmup_episodes=1000)
     monkeypatch.setattr(learner.env, "action_mask", lambda index: jnp.broadcast_to(jnp.asarray([1.0, 0.0]), (*index.shape, 2)))
     state = trained(learner, 2)
     sample = sample_steps(state.replay, jax.random.key(1), 64)
@@ -180,9 +183,9 @@ def test_what_the_actor_says_of_a_missing_joint_changes_nothing(monkeypatch):
 
 
 def test_the_policy_is_a_running_mean_of_the_actors():
-    plain, averaged = trained(make(), 3), trained(make(actor_average=0.75), 3)
+    plain = trained(make(), 3)
     before, after = (trained(make(actor_average=0.75), number) for number in (3, 4))
-    jax.tree.map(np.testing.assert_array_equal, plain.average_actor, averaged.params["actor"])
+    jax.tree.map(np.testing.assert_array_equal, plain.average_actor, before.params["actor"])
     expected = jax.tree.map(lambda mean, actor: 0.75 * mean + 0.25 * actor, before.average_actor, after.params["actor"])
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, atol=1e-6), after.average_actor, expected)
     played, _ = make().policy(after)
