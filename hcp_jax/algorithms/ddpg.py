@@ -14,7 +14,6 @@ from typing import Any, ClassVar, Protocol
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 import optax
 from brax.training.acme import running_statistics, specs
 from flax import struct
@@ -82,7 +81,7 @@ class DDPGState:
     sums: dict[str, jax.Array]
 
 
-MIN_STD = 1e-6  # to which brax's running statistics are clipped from below
+MIN_STD = 3e-4  # above what single precision makes of an input that is the same in every step, [m] or [rad]
 LOSS_METRICS = ("critic_loss", "actor_loss", "q")
 SUMS = (*LOSS_METRICS, "updates", "episodes", "successes", "final_distance")
 
@@ -169,29 +168,23 @@ class DDPG:
         return self._act(params["actor"], self.normalize(inputs, statistics))
 
     def normalize(self, inputs: jax.Array, statistics: running_statistics.RunningStatisticsState) -> jax.Array:
-        """The inputs as the networks see them: 0 for those that never varied in training, of whatever arm this one is.
-
-        But for the goal: where all episodes have the same one, it is those of hindsight that differ from it, by metres.
-        """
+        """The inputs as the networks see them: 0 for those that never varied in training, of whatever arm this one is."""
         if not self.config.normalize_inputs:
             return inputs
-        varied = statistics.std > MIN_STD
-        place = np.arange(inputs.shape[-1]) - self.env.observation_size
-        is_goal = (place >= 0) & (place < self.env.goal_size)
-        unscaled = jnp.where(is_goal, inputs - statistics.mean, 0.0)
-        return jnp.where(varied, running_statistics.normalize(inputs, statistics, max_abs_value=5.0), unscaled)
+        seen = running_statistics.normalize(inputs, statistics, max_abs_value=5.0)
+        return jnp.where(statistics.std > MIN_STD, seen, 0.0)
 
     def _train(self, state: DDPGState, num_iterations: jax.Array) -> DDPGState:
         return put_everywhere(jax.lax.fori_loop(0, num_iterations, lambda _, s: self._train_iteration(s), state))
 
     def _train_iteration(self, state: DDPGState) -> DDPGState:
-        key, key_play, key_update = jax.random.split(state.key, 3)
+        key, key_play, key_update, key_inputs = jax.random.split(state.key, 4)
         played = self._explorer.play((state.params, state.statistics), state.failure, self._is_warm(state), key_play)
-        inputs = self._step_inputs(state.params["embedding"], played.episodes)
+        inputs, weights = self._draw_inputs(state.params["embedding"], played.episodes, key_inputs)
         state = state.replace(
             iteration=state.iteration + 1,
             key=key,
-            statistics=running_statistics.update(state.statistics, inputs),
+            statistics=running_statistics.update(state.statistics, inputs, weights=weights),
             replay=add_episodes(state.replay, played.episodes),
             failure=played.failure,
             diverged=state.diverged.at[played.episodes.index].add(played.diverged.astype(jnp.int32)),
@@ -209,12 +202,23 @@ class DDPG:
         params, statistics = learned
         return self.mean_action(params, statistics, self.conditioning, index, obs, goal)
 
-    def _step_inputs(self, embedding: jax.Array | None, episodes: EpisodeBatch) -> jax.Array:
-        """The networks' inputs at every step of new episodes: [B, T, size]."""
-        obs = episodes.obs[:, :-1]
-        index = jnp.broadcast_to(episodes.index[:, None], obs.shape[:2])
-        goal = jnp.broadcast_to(episodes.desired_goal[:, None], (*obs.shape[:2], self.env.goal_size))
-        return self.conditioning.inputs(embedding, index, obs, goal)
+    def _draw_inputs(self, embedding: jax.Array | None, episodes: EpisodeBatch, key: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """The networks' inputs at as many steps as new episodes have, drawn as those of an update are, goals of hindsight among
+        them: [B * T, size], and their weights [B * T]."""
+        num_episodes, num_steps = episodes.action.shape[:2]
+        key_sample, key_goals = jax.random.split(key)
+        new = Replay(episodes, jnp.int32(num_episodes))
+        sample, goal = self._draw(new, key_sample, key_goals, num_episodes * num_steps)
+        return self.conditioning.inputs(embedding, sample.index, sample.obs, goal), sample.valid.astype(jnp.float32)
+
+    def _draw(
+        self, replay: Replay, key_sample: jax.Array, key_goals: jax.Array, num_samples: int, num_steps: jax.Array | int = 1
+    ) -> tuple[StepSample, jax.Array]:
+        """Runs of `num_steps` steps to learn from, and their goals [N, G]."""
+        config = self.config
+        sample = sample_steps(replay, key_sample, num_samples, config.n_step, num_steps)
+        goal = relabel_goals(replay, sample, key_goals, config.relabel, config.future_k, config.future_candidates)
+        return split_rows((sample, goal))
 
     def _learn(self, state: DDPGState, key: jax.Array) -> DDPGState:
         """All updates of one iteration."""
@@ -224,9 +228,7 @@ class DDPG:
         def update(carry, key):
             params, target_params, opt_state, skipped = carry
             key_sample, key_goals = jax.random.split(key)
-            sample = sample_steps(state.replay, key_sample, config.batch_size, config.n_step, num_steps)
-            goal = relabel_goals(state.replay, sample, key_goals, config.relabel, config.future_k, config.future_candidates)
-            sample, goal = split_rows((sample, goal))
+            sample, goal = self._draw(state.replay, key_sample, key_goals, config.batch_size, num_steps)
             grads, metrics = jax.grad(self._loss, has_aux=True)(params, target_params, state.statistics, sample, goal)
             params, opt_state, metrics, skipped = apply_update(
                 self._optimizer, grads, metrics, params, opt_state, skipped, sample.index

@@ -31,7 +31,8 @@ from hcp_jax.policies.goal_conditioning import GoalConditioning
 
 @dataclasses.dataclass(frozen=True)
 class ArmExperiment:
-    """A config's objects. `heldout_pool` holds held-out variants of the training types, then of the types left out."""
+    """A config's objects. `heldout_pool` holds held-out variants of the training types, then of the types left out;
+    `trained_evaluator` plays training robots with the v_h that each has learned, if v_h is learned."""
 
     config: Config
     physics: str
@@ -41,6 +42,7 @@ class ArmExperiment:
     make_env: Callable[..., GoalEnv]
     num_iterations: int
     evaluator: GoalEvaluator
+    trained_evaluator: GoalEvaluator | None
     best_metric: ClassVar[str] = "train_types_success"
 
     def robot_inputs(self, pool: RobotPool) -> Callable[[jax.Array, jax.Array], jax.Array]:
@@ -74,6 +76,10 @@ class ArmExperiment:
         if left_out.any():
             metrics |= summarise("left_out", episodes.take(left_out))
             line += f", {metrics['left_out_success']:.1f} % zero-shot on type {', '.join(untrained)}"
+        if self.trained_evaluator is not None:
+            index = first_of_each_type(self.train_pool, self.pool_config.heldout_per_type)
+            metrics |= summarise("training_robots", self.trained_evaluator(policy, index, jax.random.key(EVALUATION_SEED)))
+            line += f", {metrics['training_robots_success']:.1f} % on training robots with their own v_h"
         for name in names:
             metrics[f"success_{name}"] = 100.0 * float(episodes.success[types == name].mean())
         return metrics, line
@@ -136,7 +142,11 @@ def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:
     )
     check_memory(config, replay_bytes(learner.buffer_shapes()))
     evaluator = make_evaluator(config, learner, make_env, heldout_pool, train_pool)
-    return ArmExperiment(config, physics, train_pool, heldout_pool, learner, make_env, num_iterations, evaluator)
+    trained_evaluator = None
+    if config.encoding == "embedding":
+        trained_evaluator = make_evaluator(config, learner, make_env, train_pool, train_pool)
+    common = (learner, make_env, num_iterations)
+    return ArmExperiment(config, physics, train_pool, heldout_pool, *common, evaluator, trained_evaluator)
 
 
 def check_memory(config: Config, num_bytes: int) -> None:
@@ -196,17 +206,24 @@ def make_goal_conditioning(config: Config, pool: RobotPool, train_pool: RobotPoo
 def make_evaluator(
     config: Config, learner: DDPG, make_env: Callable[..., GoalEnv], pool: RobotPool, train_pool: RobotPool
 ) -> GoalEvaluator:
-    """Plays robots that were not trained on. Where v_h is learned, theirs is unknown: the mean of the training robots'."""
+    """Plays robots of `pool`. Where v_h is learned, those of the training pool have their own; that of others is unknown: the
+    mean of the training robots'."""
     conditioning = make_goal_conditioning(config, pool, train_pool)
 
     def policy(params, index, obs, goal):
         networks, statistics = params
-        if conditioning.is_learned:
+        if conditioning.is_learned and pool is not train_pool:
             mean = networks["embedding"].mean(axis=0)
             networks = networks | {"embedding": jax.numpy.tile(mean, (pool.num_robots, 1))}
         return learner.mean_action(networks, statistics, conditioning, index, obs, goal)
 
     return GoalEvaluator(make_env(pool), policy)
+
+
+def first_of_each_type(pool: RobotPool, count: int) -> np.ndarray:
+    """Positions of the first `count` robots of each type in `pool`, or of all where a type has fewer."""
+    types = pool.hardware["type"][:, 0]
+    return np.sort(np.concatenate([np.flatnonzero(types == number)[:count] for number in np.unique(types)]))
 
 
 def summarise(kind: str, episodes: GoalEpisodes) -> dict[str, float | None]:

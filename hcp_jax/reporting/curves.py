@@ -16,6 +16,7 @@ from hcp_jax.training.metrics import METRICS_FILE
 
 SUCCESS = "train_types_success"
 LEFT_OUT = "left_out_success"
+TRAINING_ROBOTS = "training_robots_success"
 LABEL = "success [%]"
 LIMITS = (-2.0, 102.0)
 SPREAD = "Lines are means over seeds, bands the range over seeds where there are several."
@@ -77,10 +78,16 @@ def make_leave_one_out(published: Published, setting: Setting) -> Item:
 
 
 def make_curves(published: Published, title: str, names: Sequence[str]) -> Item:
-    """One panel of experiments by name."""
-    figure = draw_groups(published, published.runs_of(names), SUCCESS, "New arms of type I.")
-    text = describe_missing(published, names)
-    return Item(title, text, figures=(figure,) if figure else (), commands=(*train_commands(names), RESULTS_COMMANDS[1]))
+    """A panel of experiments by name, and one of those whose training robots have a learned v_h of their own."""
+    groups = published.runs_of(names)
+    panels = ((SUCCESS, "New arms of type I."), (TRAINING_ROBOTS, "Arms that were trained on, with the v_h that they learned."))
+    figures = [draw_groups(published, groups, column, caption) for column, caption in panels]
+    return Item(
+        title,
+        describe_missing(published, names),
+        figures=tuple(figure for figure in figures if figure is not None),
+        commands=(*train_commands(names), RESULTS_COMMANDS[1]),
+    )
 
 
 def make_finetuning(published: Published, letter: str, name: str) -> Item:

@@ -14,6 +14,7 @@ _SERIES = {
     "heldout_fitted_return_mean": "held-out robots, fitted v_h",
     "train_types_success": "held-out robots of the training types",
     "left_out_success": "types left out",
+    "training_robots_success": "training robots with their own v_h",
 }
 
 

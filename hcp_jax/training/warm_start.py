@@ -75,7 +75,8 @@ def _start_ppo(source: PPOState, state: PPOState, all_layers: bool) -> PPOState:
 
 
 def _start_ddpg(source: DDPGState, state: DDPGState, all_layers: bool) -> DDPGState:
-    networks = {name: source.params[name] for name in state.target_params}
+    """With the mean of the actors, the policy that the old run is known by."""
+    networks = {name: source.params[name] for name in state.target_params} | {"actor": source.average_actor}
     if not all_layers:
         networks = {name: take_hidden_layers(old, state.params[name]) for name, old in networks.items()}
     return state.replace(

@@ -14,7 +14,7 @@ from hcp_jax import train
 from hcp_jax.algorithms.ppo import get_actor
 from hcp_jax.config import to_dict
 from hcp_jax.evaluation.summary import read_wall_seconds
-from hcp_jax.training import loop
+from hcp_jax.training import loop, warm_start
 from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
 from hcp_jax.training.loop import Interrupt, TrainingLoop
 from hcp_jax.training.metrics import read_rows
@@ -242,6 +242,17 @@ def test_arms_start_from_the_layers_of_another_run(finished_arms, tiny_arms):
     jax.tree.map(np.testing.assert_array_equal, state.target_params["actor"], state.params["actor"])
     config = dataclasses.replace(config, init_layers="all")
     jax.tree.map(np.testing.assert_array_equal, load_init(config)(run, run.init_state()).params, source.params)
+
+
+def test_arms_start_from_the_mean_of_the_actors(finished_arms, tiny_arms, monkeypatch):
+    run = loop.make_experiment(tiny_arms)
+    iteration, source = load_policy(finished_arms, run)
+    mean = jax.tree.map(lambda leaf: leaf + 1.0, source.average_actor)
+    monkeypatch.setattr(warm_start, "load_policy", lambda *_: (iteration, source.replace(average_actor=mean)))
+    config = dataclasses.replace(tiny_arms, init=str(finished_arms), init_layers="all")
+    state = load_init(config)(run, run.init_state())
+    for actor in (state.params["actor"], state.target_params["actor"], state.average_actor):
+        jax.tree.map(np.testing.assert_array_equal, actor, mean)
 
 
 def test_hoppers_do_not_start_from_an_arms_run(finished_arms, tiny_config):
