@@ -1,10 +1,10 @@
 """`python -m hcp_jax.benchmark physics|learner|train|scale [--config FILE] [--rows NAME ...] [--json FILE]`"""
 
 import argparse
+import math
 from collections.abc import Iterable, Iterator, Sequence
 
 import jax
-from rich.console import Console
 from rich.table import Table
 
 from hcp_jax import command_line, presets
@@ -36,12 +36,17 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--to-success", type=float, help="of train: wall time until this share [%%] succeeds instead")
     parser.add_argument("--limit", type=float, default=3600.0, help="of --to-success: seconds after which a row is given up")
     parser.add_argument("--seconds", type=float, default=1.0, help="shortest time of one measurement")
-    parser.add_argument("--json", type=command_line.output_file, help="file to write the rows to")
+    parser.add_argument("--json", type=command_line.output_file(".json"), help="file to write the rows to")
     options, overrides = parser.parse_known_args(arguments)
     with command_line.user_errors_end_the_command():
         for name in ("batches", "sizes"):
             if min(getattr(options, name)) < 1:
                 raise ConfigError(f"--{name}={min(getattr(options, name))}: expected at least 1")
+        for name in ("seconds", "limit"):
+            if not 0.0 < getattr(options, name) < math.inf:
+                raise ConfigError(f"--{name}={getattr(options, name)}: expected a number above 0")
+        if options.to_success is not None and not 0.0 < options.to_success <= 100.0:
+            raise ConfigError(f"--to-success={options.to_success}: expected above 0, at most 100")
         if options.config:
             config = command_line.load_config(options.config, overrides)
         else:
@@ -102,7 +107,7 @@ def print_rows(title: str, rows: list[dict]) -> None:
     for row in rows:
         cells = (row.get(column, "") for column in columns)
         table.add_row(*(format_number(cell) for cell in cells))
-    Console().print(table)
+    command_line.show(table)
 
 
 def print_speeds(title: str, rows: list[dict]) -> None:
@@ -116,7 +121,7 @@ def print_speeds(title: str, rows: list[dict]) -> None:
         for name in dict.fromkeys(row["name"] for row in rows):
             speeds = {row["num_envs"]: row[f"{unit}_steps_per_second"] for row in rows if row["name"] == name}
             table.add_row(name, *(f"{speeds[batch]:,.0f}" for batch in batches))
-        Console().print(table)
+        command_line.show(table)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ import argparse
 import pathlib
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from hcp_jax import command_line
@@ -26,7 +25,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--trials", type=int, default=10)
     parser.add_argument("--episodes-per-trial", type=int, default=100)
     command_line.add_physics_option(parser)
-    parser.add_argument("--json", type=command_line.output_file, help="file to write the table to")
+    parser.add_argument("--json", type=command_line.output_file(".json"), help="file to write the table to")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
         for name in ("trials", "episodes_per_trial"):
@@ -51,11 +50,10 @@ def print_table(rows: list[dict]) -> None:
         parts = [*row["zero_shot"], row["fine_tuned"] or {}]
         values = [row["reachable_share"], *(part.get("success_mean") for part in parts)]
         table.add_row(row["robot"], *("n/a" if value is None else f"{value:.1f}" for value in values))
-    console = Console()
-    console.print(table)
+    command_line.show(table)
     for column, name in enumerate(names):
         median = np.median([row["zero_shot"][column]["success_mean"] for row in rows])
-        console.print(f"median zero-shot success: {median:.1f} %, {name}")
+        command_line.show(f"median zero-shot success: {median:.1f} %, {name}")
 
 
 if __name__ == "__main__":

@@ -8,11 +8,12 @@ import re
 import runpy
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import jax
 from absl import flags
 from ml_collections import ConfigDict, config_flags
+from rich.console import Console
 
 from hcp_jax.config import MAX_SEED, Config, ConfigError, field_names, from_dict, to_dict, unknown_field
 from hcp_jax.errors import NonFiniteError, PhysicsOverflowError, UserError, one_line
@@ -50,17 +51,40 @@ def user_errors_end_the_command() -> Iterator[None]:
         sys.exit(BROKEN)
 
 
-def output_file(word: str) -> pathlib.Path:
-    """A path on the command line that a file will be written to; one where none can be ends the command before its work."""
+def new_output(word: str) -> pathlib.Path:
+    """A path on the command line where a file or folder will be made. Where none can be, the command ends before its work."""
     path = pathlib.Path(word)
     try:
-        if path.exists():
-            path.open("a").close()
-        else:
-            tempfile.TemporaryFile(dir=next(parent for parent in path.absolute().parents if parent.exists())).close()
+        place = path if path.is_dir() else next(parent for parent in path.absolute().parents if parent.exists())
+        tempfile.TemporaryFile(dir=place).close()
     except OSError as error:
         raise argparse.ArgumentTypeError(f"{word}: cannot be written ({error.strerror})") from error
     return path
+
+
+def output_file(*suffixes: str) -> Callable[[str], pathlib.Path]:
+    """Reads a path on the command line that a file will be written to; over an older one if that ends in one of `suffixes`."""
+
+    def read(word: str) -> pathlib.Path:
+        path = pathlib.Path(word)
+        if not path.exists():
+            return new_output(word)
+        if path.is_file() and path.suffix not in suffixes:
+            raise argparse.ArgumentTypeError(
+                f"{word}: exists: expected a new file, or one that ends in {' or '.join(suffixes)}"
+            )
+        try:
+            path.open("a").close()
+        except OSError as error:
+            raise argparse.ArgumentTypeError(f"{word}: cannot be written ({error.strerror})") from error
+        return path
+
+    return read
+
+
+def show(*things: object) -> None:
+    """Prints lines and rich tables to the terminal; brackets in them are text and no markup."""
+    Console(markup=False).print(*things)
 
 
 def seed(word: str) -> int:

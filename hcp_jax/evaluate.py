@@ -3,7 +3,6 @@
 import argparse
 import pathlib
 
-from rich.console import Console
 from rich.table import Table
 
 from hcp_jax import command_line
@@ -45,7 +44,7 @@ def main(arguments: list[str] | None = None) -> None:
     command_line.add_chain_options(parser)
     parser.add_argument("--seed", type=command_line.seed, default=0, help="seed of the initial states")
     parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
-    parser.add_argument("--json", type=command_line.output_file, help="file to write the whole record to")
+    parser.add_argument("--json", type=command_line.output_file(".json"), help="file to write the whole record to")
     parser.add_argument("--without-robots", action="store_true", help="leave the rows of single robots out of that file")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
@@ -58,7 +57,7 @@ def main(arguments: list[str] | None = None) -> None:
         if task == "hopper":
             record = evaluate_hoppers(options.run, fit_steps=options.fit_steps, first_steps=options.first_steps, **settings)
         else:
-            if options.robot:
+            if options.robot is not None:
                 robot = load_robot(options.robot, options.base, options.tip)
                 settings["own_robots"] = {pathlib.Path(options.robot).stem: robot}
             record = evaluate_arms(options.run, types=options.types or (), **settings)
@@ -76,13 +75,16 @@ def check_options(options: argparse.Namespace, config: Config) -> None:
     check_types(config, options.types or ())
     if options.pool and options.range:
         raise ConfigError("--range: not with --pool, whose robots are drawn already")
-    if options.first_steps and config.task != "hopper":
-        raise ConfigError("--first-steps: goes with a policy of hoppers")
-    if (options.base or options.tip) and not options.robot:
+    for name in ("first_steps", "fit_steps"):
+        if getattr(options, name) and config.task != "hopper":
+            raise ConfigError(f"--{name.replace('_', '-')}: goes with a policy of hoppers")
+    if min(options.first_steps, default=1) < 1:
+        raise ConfigError(f"--first-steps={min(options.first_steps)}: expected at least 1")
+    if (options.base or options.tip) and options.robot is None:
         raise ConfigError("--base, --tip: go with --robot")
     if (options.fit_steps or 0) < 0:
         raise ConfigError(f"--fit-steps={options.fit_steps}: expected at least 0")
-    if options.robot and (config.task == "hopper" or options.types or options.pool or options.range):
+    if options.robot is not None and (config.task == "hopper" or options.types or options.pool or options.range):
         raise ConfigError("--robot: goes with a policy of arms, and not with --types, --pool or --range")
 
 
@@ -114,7 +116,7 @@ def print_table(record: dict) -> None:
         table.add_column(column, justify="right")
     for name, values in rows.items():
         table.add_row(name, *("n/a" if values[key] is None else f"{values[key]:.1f}" for key in columns.values()))
-    Console().print(table)
+    command_line.show(table)
 
 
 if __name__ == "__main__":

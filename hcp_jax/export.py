@@ -17,7 +17,7 @@ def main(arguments: list[str] | None = None) -> None:
         help=f"H:3 (held-out robot 3 of a type), train:3 (one trained on); or {command_line.OWN_ARM}",
     )
     command_line.add_chain_options(parser)
-    parser.add_argument("--out", type=pathlib.Path, required=True, help="new folder")
+    parser.add_argument("--out", type=command_line.new_output, required=True, help="new folder")
     parser.add_argument("--best", action="store_true", help="the best checkpoint instead of the newest")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():

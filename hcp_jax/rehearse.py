@@ -2,7 +2,6 @@
 
 import pathlib
 
-from rich.console import Console
 from rich.table import Table
 
 from hcp_jax import command_line
@@ -25,7 +24,7 @@ def main(arguments: list[str] | None = None) -> None:
     command_line.add_chain_options(parser)
     parser.add_argument("--goals", type=int, default=20)
     parser.add_argument("--seed", type=command_line.seed, default=0, help="seed of goals, start poses, noise and jitter")
-    parser.add_argument("--json", type=command_line.output_file, help="file to write the whole record to")
+    parser.add_argument("--json", type=command_line.output_file(".json"), help="file to write the whole record to")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
         if options.goals < 1:
@@ -47,7 +46,7 @@ def print_record(record: dict) -> None:
     for name, row in record["conditions"].items():
         distances = (f"{value:.3f}" for value in row["final_distance_quantiles"].values())
         table.add_row(name, f"{row['success']:.0f}", *distances)
-    Console().print(table)
+    command_line.show(table)
 
 
 if __name__ == "__main__":

@@ -22,7 +22,9 @@ def main(arguments: list[str] | None = None) -> None:
     robots.add_argument("--grid", action="store_true", help="the first held-out robot of every type; nine hoppers")
     robots.add_argument("--robot", help=command_line.OWN_ARM)
     command_line.add_chain_options(parser)
-    parser.add_argument("--out", type=pathlib.Path, required=True, help=".mp4, .gif, or .png for a few pictures in a row")
+    parser.add_argument(
+        "--out", type=command_line.new_output, required=True, help=".mp4, .gif, or .png for a few pictures in a row"
+    )
     parser.add_argument("--pictures", type=int, default=5, help="of each robot in a .png; 1 shows the ends of the episodes")
     command_line.add_physics_option(parser)
     parser.add_argument("--seed", type=command_line.seed, default=0, help="seed of start poses, goals and noise")
@@ -34,14 +36,14 @@ def main(arguments: list[str] | None = None) -> None:
         chosen = [read_robot(word) for word in options.robots or ()]
         if len(chosen) > MAX_ROBOTS:
             raise ConfigError(f"--robots: {len(chosen)} of them: expected at most {MAX_ROBOTS}")
-        if (options.base or options.tip) and not options.robot:
+        if (options.base or options.tip) and options.robot is None:
             raise ConfigError("--base, --tip: go with --robot")
-        if options.robot and read_config(options.run).task == "hopper":
+        if options.robot is not None and read_config(options.run).task == "hopper":
             raise ConfigError("--robot: goes with a policy of arms")
         check_output(options.out)
         backend = choose_backend()
         own = None
-        if options.robot:
+        if options.robot is not None:
             own = (pathlib.Path(options.robot).stem, load_robot(options.robot, options.base, options.tip))
         command_line.enable_compilation_cache()
         recording = record_episodes(options.run, chosen, own, options.physics, options.seed, options.best)

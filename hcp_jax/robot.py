@@ -5,7 +5,6 @@ import dataclasses
 import pathlib
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from hcp_jax import command_line, presets
@@ -32,7 +31,7 @@ def main(arguments: list[str] | None = None) -> None:
     command_line.add_chain_options(parser)
     parser.add_argument("--policy", type=pathlib.Path, help="run or published policy whose training arms to compare with")
     parser.add_argument("--task", choices=list(CHAIN_TEMPLATES), default="reacher", help="else the paper's arms, of this task")
-    parser.add_argument("--json", type=command_line.output_file, help="file to write all of it to")
+    parser.add_argument("--json", type=command_line.output_file(".json"), help="file to write all of it to")
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
         robot = load_robot(options.file, options.base, options.tip)
@@ -73,7 +72,6 @@ def describe(robot: RobotFile, own: RobotPool, trained: RobotPool) -> dict:
 
 
 def print_record(record: dict) -> None:
-    console = Console()
     table = Table(title=f"{record['base']} to {record['tip']}: {len(record['joints'])} joints")
     heads = ("joint", "range [rad]", "torque limit [N m]", "mass [kg]", "damping", "friction loss", "armature")
     for head in heads:
@@ -81,25 +79,25 @@ def print_record(record: dict) -> None:
     for joint in record["joints"]:
         numbers = (f"{joint[name]:g}" for name in ("torque_limit", "link_mass", "damping", "frictionloss", "armature"))
         table.add_row(joint["name"], "{:.2f} to {:.2f}".format(*joint["range"]), *numbers)
-    console.print(table)
+    command_line.show(table)
     for note in record["notes"]:
-        console.print(f"note: {note}")
+        command_line.show(f"note: {note}")
     poses = Table(title="v_h (`chain`): each joint in the frame of the one before, last the tip")
     for head in ("", "x [m]", "y [m]", "z [m]", "x [rad]", "y [rad]", "z [rad]"):
         poses.add_column(head, justify="right")
     for name, row in zip([*(joint["name"] for joint in record["joints"]), record["tip"]], record["chain"], strict=True):
         poses.add_row(name, *(f"{value:.4f}" for value in row))
-    console.print(poses)
+    command_line.show(poses)
     nearest = record["nearest"]
-    console.print(
+    command_line.show(
         f"nearest training arm: type {nearest['type']}, robot {nearest['robot_id']}, "
         f"{nearest['distance']:.2f} standard deviations away"
     )
     outside = [entry for entry in record["entries"] if not entry["is_inside"]]
-    console.print(f"outside the training arms' ranges: {len(outside)} of {len(record['entries'])} entries")
+    command_line.show(f"outside the training arms' ranges: {len(outside)} of {len(record['entries'])} entries")
     for entry in outside:
         trained = "none that has it" if entry["low"] is None else f"{entry['low']:.4g} to {entry['high']:.4g}"
-        console.print(f"  {entry['name']}: {entry['value']:.4g}, trained on {trained}")
+        command_line.show(f"  {entry['name']}: {entry['value']:.4g}, trained on {trained}")
 
 
 if __name__ == "__main__":

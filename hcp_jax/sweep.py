@@ -25,7 +25,9 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("list", help="Python file whose get_configs() gives the experiments; it will be executed")
     parser.add_argument("--seeds", type=int, default=1, help="seeds 0 to SEEDS-1 of each experiment")
     parser.add_argument("--out", type=pathlib.Path, help="folder of run folders (default: runs/LIST)")
-    parser.add_argument("--summary", type=command_line.output_file, help="JSON file for the table (default: OUT/summary.json)")
+    parser.add_argument(
+        "--summary", type=command_line.output_file(".json"), help="JSON file for the table (default: OUT/summary.json)"
+    )
     parser.add_argument("--ray", metavar="ADDRESS", help="run on this Ray cluster; `local`: on one of this machine's cores")
     parser.add_argument("--cpus-per-run", type=int, default=1, help="with --ray: cores that each run reserves")
     known, overrides = parser.parse_known_args(arguments)

@@ -15,7 +15,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument(
         "--config", help="experiment file; it is Python and will be executed. Not needed to --resume --out FOLDER"
     )
-    parser.add_argument("--out", type=pathlib.Path, help="run folder (default: runs/NAME)")
+    parser.add_argument("--out", type=command_line.new_output, help="run folder (default: runs/NAME)")
     parser.add_argument("--resume", action="store_true", help="go on from the run folder's newest checkpoint")
     parser.add_argument("--distributed", action="store_true", help="trains together with other processes")
     known, overrides = parser.parse_known_args(arguments)

@@ -251,7 +251,12 @@ def test_ctrl_c_in_a_runs_last_seconds_ends_the_sweep_after_it(tiny_config, tmp_
 
 @pytest.mark.parametrize(
     ("arguments", "expected"),
-    [(["--tip", "hand"], "--base, --tip: go with --robot"), (["--fit-steps", "-5"], "--fit-steps=-5: expected at least 0")],
+    [
+        (["--tip", "hand"], "--base, --tip: go with --robot"),
+        (["--fit-steps", "-5"], "--fit-steps=-5: expected at least 0"),
+        (["--first-steps", "50", "-3"], "--first-steps=-3: expected at least 1"),
+        (["--robot", ""], "--robot: goes with a policy of arms"),
+    ],
 )
 def test_options_that_would_be_ignored_are_refused(arguments, expected, capsys):
     assert expected in fails(capsys, evaluate.main, [str(POLICY), *arguments])

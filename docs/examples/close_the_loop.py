@@ -17,7 +17,13 @@ parser.add_argument("--goal", type=float, nargs=3, help="of the end effector, in
 parser.add_argument("--start", type=int, default=0, help="which of the poses that training started from")
 options = parser.parse_args()
 
+if not (options.folder / "policy.json").exists():
+    parser.error(f"{options.folder}: not a folder that hcp_jax.export wrote")
 policy = json.loads((options.folder / "policy.json").read_text())
+if policy["task"] != "reacher":
+    parser.error(f"{options.folder}: a policy of {policy['task']}: expected one of the reacher")
+if not 0 <= options.start < len(policy["start_angles"]):
+    parser.error(f"--start={options.start}: expected 0 to {len(policy['start_angles']) - 1}")
 session = onnxruntime.InferenceSession(options.folder / "policy.onnx", providers=["CPUExecutionProvider"])
 model = mujoco.MjModel.from_xml_path(str(options.folder / "robot.xml"))
 data = mujoco.MjData(model)

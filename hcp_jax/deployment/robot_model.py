@@ -7,6 +7,8 @@ from hcp_jax.hardware import chain, hopper
 from hcp_jax.hardware.arm_pool import read_pooled_chain
 from hcp_jax.physics.base import MJ_INTEGRATORS
 
+_NO_JOINT = "hcp_jax "  # begins names that no file has
+
 
 def write_model(robot: ChosenRobot, sim_dt: float, integrator: str) -> str:
     """MJCF with the robot's joint names, whose controls are torques [N m]. MuJoCo writes numbers with six digits.
@@ -30,8 +32,10 @@ def arm_model(robot: ChosenRobot) -> mujoco.MjSpec:
     """A chain of the arm's joints, its `ref_pt` and what its task puts beside it."""
     spec = mujoco.MjSpec.from_string(chain.without_padding(robot.pool.template, len(robot.joints)))
     chain.edit_spec(spec, read_pooled_chain(robot.pool, 0))
-    for slot, name in enumerate(robot.joints):
-        joint, motor = spec.joint(f"slot{slot}"), spec.actuator(f"slot{slot}")
+    driven = [(spec.joint(f"slot{slot}"), spec.actuator(f"slot{slot}")) for slot in range(len(robot.joints))]
+    for slot, (joint, motor) in enumerate(driven):  # free the names first: a robot's joint may be called as another's slot
+        joint.name = motor.name = motor.target = f"{_NO_JOINT}{slot}"
+    for name, (joint, motor) in zip(robot.joints, driven, strict=True):
         joint.name = motor.name = motor.target = name
     return spec
 

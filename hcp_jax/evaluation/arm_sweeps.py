@@ -7,12 +7,12 @@ import jax
 import numpy as np
 
 from hcp_jax.algorithms.ddpg import DDPGState
-from hcp_jax.config import Config, ConfigError
+from hcp_jax.config import ConfigError
 from hcp_jax.envs.goal_episodes import GoalEpisodes
 from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, check_types, load_pool
 from hcp_jax.evaluation.records import QUANTILES
 from hcp_jax.evaluation.statistics import describe_evaluation
-from hcp_jax.experiment.arm import ArmExperiment, load_own_robot, make_evaluator, make_heldout_arms
+from hcp_jax.experiment.arm import ArmExperiment, load_own_robot, make_evaluator, make_heldout_arms, own_robot_name
 from hcp_jax.experiment.build import for_own_robots, make_experiment
 from hcp_jax.hardware.arm import ALL_TYPES, type_name
 from hcp_jax.hardware.inverse_kinematics import is_reachable
@@ -97,11 +97,6 @@ def choose_pools(
     types = types or tuple(dict.fromkeys((*run.pool_config.types, *run.pool_config.left_out)))
     drawn = change_ranges(config, ranges, types)
     return {name: make_heldout_arms(drawn, (name,), count) for name in types}
-
-
-def own_robot_name(config: Config) -> str:
-    """What records call the arm from a file that a run was trained on; empty without one."""
-    return pathlib.Path(config.robot).stem
 
 
 def evaluate_type(

@@ -11,7 +11,7 @@ from hcp_jax.experiment.base import TrainingState
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE, read_rows
 from hcp_jax.training.policy_file import load_policy, write_policy
-from hcp_jax.training.run_folder import CONFIG_FILE, ENVIRONMENT_FILE, find_differences, read_config
+from hcp_jax.training.run_folder import CONFIG_FILE, ENVIRONMENT_FILE, find_differences, read_config, saved_robot_path
 
 _FILES = (CONFIG_FILE, ENVIRONMENT_FILE, TIMING_FILE, METRICS_FILE)  # of a run, the one last that makes it one to be found
 
@@ -40,7 +40,7 @@ def publish_runs(folders: Sequence[pathlib.Path], out: pathlib.Path, policies: p
         _check_replaceable(folder, policies / folder.name)
     read = [(folder.name, *_read_run(folder)) for folder in folders]
     for name, files, state in read:
-        _write_files(policies / name, {key: files[key] for key in (CONFIG_FILE, ENVIRONMENT_FILE)})
+        _write_files(policies / name, {key: files[key] for key in files if key not in (TIMING_FILE, METRICS_FILE)})
         write_policy(policies / name, state)
         _write_files(out / "runs" / name, files)
     return find_runs(out / "runs")
@@ -63,13 +63,16 @@ def describe_published(folders: Sequence[pathlib.Path], out: pathlib.Path, polic
 
 def _read_run(folder: pathlib.Path) -> tuple[dict[str, bytes], TrainingState]:
     """The files of a run that are published, and a state that holds its newest policy."""
-    files = {name: (folder / name).read_bytes() for name in _FILES}
-    return files, load_policy(folder, make_experiment(read_config(folder)))[1]
+    config = read_config(folder)
+    saved = saved_robot_path(folder, config)
+    names = (str(saved.relative_to(folder)), *_FILES) if saved.exists() else _FILES
+    files = {name: (folder / name).read_bytes() for name in names}
+    return files, load_policy(folder, make_experiment(config))[1]
 
 
 def _write_files(folder: pathlib.Path, files: Mapping[str, bytes]) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)
 
 

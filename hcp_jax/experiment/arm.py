@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import os
+import pathlib
 from collections.abc import Callable
 from typing import ClassVar
 
@@ -71,7 +72,7 @@ class ArmExperiment:
         untrained = [name for name in names if name not in (*self.pool_config.types, OWN_TYPE)]
         left_out = np.isin(types, untrained)
         metrics = summarise("train_types", episodes.take(~left_out))
-        robots = self.config.robot or "held-out robots of the training types"
+        robots = own_robot_name(self.config) or "held-out robots of the training types"
         line = f"success {metrics['train_types_success']:.1f} % on {robots}"
         if left_out.any():
             metrics |= summarise("left_out", episodes.take(left_out))
@@ -173,6 +174,11 @@ def make_heldout_arms(config: Config, types: tuple[str, ...], num_per_type: int)
     pools = config.pool
     assert isinstance(pools, ArmPoolConfig)
     return make_arm_pool(config.task, pools.ranges, types, num_per_type, pools.seed, "heldout", pools.chain_ranges)
+
+
+def own_robot_name(config: Config) -> str:
+    """What records call the arm from a file that a run was trained on; empty without one."""
+    return pathlib.Path(config.robot).stem
 
 
 def load_own_robot(config: Config) -> RobotFile:

@@ -92,6 +92,8 @@ def choose_robot(
     """
     choice = read_choice(name)
     if choice:
+        if base or tip:
+            raise ConfigError("--base, --tip: go with a file of an arm")
         check_choice(run.config, choice, (*heldout_kinds(run.config), TRAINED), "--robot")
         pool = make_chosen_pool(run, [choice])
         return ChosenRobot(name, pool, _joint_names(run, pool), choice.row if choice.kind == TRAINED else None)

@@ -3,7 +3,7 @@
 import pathlib
 
 from hcp_jax.hardware.pool import robots_path
-from hcp_jax.hardware.robot_file import RobotFile, RobotFileError, read_robot
+from hcp_jax.hardware.robot_file import RobotFile, RobotFileError, read_robot, read_saved_robot
 
 
 def catalogue_names() -> tuple[str, ...]:
@@ -20,11 +20,14 @@ def find_robot(name: str | pathlib.Path) -> pathlib.Path:
     if str(name) in catalogue_names():
         return robots_path() / "catalogue" / f"{name}.urdf"
     path = pathlib.Path(name)
-    if not path.exists():
-        raise RobotFileError(f"{name}: no such file, and no arm of the catalogue: {', '.join(catalogue_names())}")
+    if not str(name) or not path.exists():
+        raise RobotFileError(
+            f"{str(name) or '(no name)'}: no such file, and no arm of the catalogue: {', '.join(catalogue_names())}"
+        )
     return path
 
 
 def load_robot(name: str | pathlib.Path, base: str | None = None, tip: str | None = None) -> RobotFile:
-    """`read_robot` of an arm of the catalogue, by its name, or of a file."""
-    return read_robot(find_robot(name), base, tip)
+    """`read_robot` of an arm of the catalogue, by its name, or of a file; or the arm that `save_robot` wrote."""
+    path = find_robot(name)
+    return read_saved_robot(path) if path.suffix == ".json" else read_robot(path, base, tip)

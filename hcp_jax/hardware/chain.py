@@ -55,6 +55,17 @@ class Chain:
     def num_joints(self) -> int:
         return len(self.mass)
 
+    def is_consistent(self) -> bool:
+        """Whether every field is finite and has a row for each joint."""
+        n = self.num_joints
+        widths = {"com": (3,), "inertia_quat": (4,), "inertia": (3,), "joint_range": (2,)}
+        shapes = {field.name: (n, *widths.get(field.name, ())) for field in dataclasses.fields(self)}
+        shapes |= {"pos": (n + 1, 3), "quat": (n + 1, 4)}
+        values = {name: getattr(self, name) for name in shapes}
+        return 1 <= n <= MAX_JOINTS and all(
+            values[name].shape == shape and np.isfinite(values[name]).all() for name, shape in shapes.items()
+        )
+
     def padded(self, name: str) -> np.ndarray:
         """Field `name` with zeros for missing joints: [7, ...]. Quaternions are padded with the identity."""
         values = getattr(self, name)

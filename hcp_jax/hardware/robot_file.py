@@ -10,27 +10,23 @@ import json
 import pathlib
 import subprocess
 import sys
-import xml.etree.ElementTree as ElementTree
-from xml.parsers import expat
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
 
-from hcp_jax.errors import UserError, one_line
-from hcp_jax.hardware.chain import MAX_JOINTS, Chain, ChainError, read_chain
+from hcp_jax.errors import one_line
+from hcp_jax.hardware.chain import MAX_JOINTS, Chain, read_chain
+from hcp_jax.hardware.robot_formats import RobotFileError, load_robot_spec
 
-MAX_BYTES = 20_000_000
 MAX_SECONDS = 9.0
 # What is assumed where a file says nothing: [N m] of joint 0 to 6, as the arms that policies were trained on; [N m s/rad],
 # [kg m^2]. A geared joint has both: without them a light wrist accelerates by 1000 rad/s^2, and 4 ms steps diverge.
 ASSUMED_TORQUE_LIMITS = (80.0, 80.0, 40.0, 40.0, 9.0, 9.0, 9.0)
 ASSUMED_DAMPING, ASSUMED_ARMATURE = 1.0, 0.1
+GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] of all our models
 _TIP_SITE = "hcp_jax tip"  # a name that no file has
 _MIN_INERTIA = 1e-12  # [kg], [kg m^2]
-
-
-class RobotFileError(UserError):
-    """A robot file cannot be read as a serial arm."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,17 +71,48 @@ def read_robot(path: str | pathlib.Path, base: str | None = None, tip: str | Non
         raise RobotFileError(f"{path}: MuJoCo ended without an answer (exit code {done.returncode})") from None
     if "error" in answer:
         raise RobotFileError(f"{path}: {answer['error']}")
-    chain = Chain(**{name: np.asarray(values, np.float64) for name, values in answer["chain"].items()})
-    return RobotFile(chain, tuple(answer["joints"]), answer["base"], answer["tip"], tuple(answer["notes"]))
+    return parse_robot(answer)
+
+
+def describe_robot(robot: RobotFile) -> dict:
+    """All of it, for JSON."""
+    chain = {field.name: getattr(robot.chain, field.name).tolist() for field in dataclasses.fields(robot.chain)}
+    return {"chain": chain, "joints": robot.joints, "base": robot.base, "tip": robot.tip, "notes": robot.notes}
+
+
+def parse_robot(values: dict) -> RobotFile:
+    """The inverse of `describe_robot`. Raises RobotFileError."""
+    try:
+        chain = Chain(**{name: np.asarray(rows, np.float64) for name, rows in values["chain"].items()})
+        joints, base, tip, notes = (values[name] for name in ("joints", "base", "tip", "notes"))
+        is_whole = len(joints) == chain.num_joints and chain.is_consistent()
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise RobotFileError("damaged record of an arm") from error
+    if not is_whole:
+        raise RobotFileError("damaged record of an arm")
+    return RobotFile(chain, tuple(map(str, joints)), str(base), str(tip), tuple(map(str, notes)))
+
+
+def save_robot(robot: RobotFile, path: pathlib.Path) -> None:
+    """Writes an arm as JSON, in a folder that is made if it is missing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(describe_robot(robot), indent=2) + "\n")
+
+
+def read_saved_robot(path: pathlib.Path) -> RobotFile:
+    """The arm that `save_robot` wrote. Raises RobotFileError."""
+    try:
+        return parse_robot(json.loads(path.read_text()))
+    except OSError as error:
+        raise RobotFileError(f"{path}: {error.strerror or 'cannot be read'}") from error
+    except ValueError as error:  # RobotFileError among them
+        raise RobotFileError(f"{path}: damaged record of an arm") from error
 
 
 def read_robot_here(path: pathlib.Path, base: str | None, tip: str | None) -> RobotFile:
     """`read_robot` in this process, which a hostile file may take down."""
     notes: list[str] = []
-    root = parse_xml(path)
-    if root.tag not in ("robot", "mujoco"):
-        raise RobotFileError(f"starts with <{root.tag}>: expected <robot> (URDF) or <mujoco> (MJCF)")
-    spec = load_urdf(root) if root.tag == "robot" else load_mjcf(path, root, notes)
+    spec, moved_by = load_robot_spec(path, notes)
     name_all(spec)
     names = [body.name for body in spec.bodies]
     for role, name in (("base", base), ("tip", tip)):
@@ -99,7 +126,9 @@ def read_robot_here(path: pathlib.Path, base: str | None, tip: str | None) -> Ro
         raise RobotFileError(f"--base={base}: not between the root and {tip_body.name}")
     moving = path_bodies[path_bodies.index(base_body) + (1 if base else 0) :]
     fix_joints(spec, moving, notes)
+    check_joints(moving, moved_by)
     check_masses(spec, moving)
+    note_other_forces(spec, moving, notes)
     tip_body.add_site(name=_TIP_SITE)
     try:
         model = spec.compile()
@@ -113,81 +142,6 @@ def read_robot_here(path: pathlib.Path, base: str | None, tip: str | None) -> Ro
     return RobotFile(chain, tuple(j.name for j in joints), base_body.name or "world", tip_body.name, tuple(notes))
 
 
-def parse_xml(path: pathlib.Path) -> ElementTree.Element:
-    """The root of a URDF or MJCF file, or of one that it includes.
-
-    Document types are refused: with them a short file can expand without bound.
-    """
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise RobotFileError(f"larger than {MAX_BYTES / 1e6:.0f} MB")
-        text = path.read_bytes()
-    except OSError as error:
-        raise RobotFileError(error.strerror or "cannot be read") from error
-
-    def refuse(*_):
-        raise RobotFileError("has a document type declaration (<!DOCTYPE ...>), which is not allowed")
-
-    checker = expat.ParserCreate()
-    checker.StartDoctypeDeclHandler = refuse
-    try:
-        checker.Parse(text, True)
-        root = ElementTree.fromstring(text)
-    except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
-        if isinstance(error, RobotFileError):
-            raise
-        raise RobotFileError(f"not XML ({one_line(error)})") from error
-    return root
-
-
-def load_urdf(root: ElementTree.Element) -> mujoco.MjSpec:
-    """Links, joints and inertias of a URDF; MuJoCo reads them."""
-    for child in list(root):
-        if child.tag not in ("link", "joint"):
-            root.remove(child)
-    for link in root.iter("link"):
-        for picture in [child for child in link if child.tag != "inertial"]:
-            link.remove(picture)
-    for joint in root.iter("joint"):
-        name, limit = joint.get("name"), joint.find("limit")
-        if joint.get("type") == "continuous" and limit is not None:
-            for side in ("lower", "upper"):
-                limit.attrib.pop(side, None)
-        if joint.get("type") == "revolute" and (limit is None or limit.get("lower") == limit.get("upper")):
-            raise RobotFileError(f"joint {name}: revolute without limits; give them, or make it continuous")
-    extension = ElementTree.SubElement(root, "mujoco")
-    ElementTree.SubElement(extension, "compiler", {"fusestatic": "false", "discardvisual": "false"})
-    return load_spec(ElementTree.tostring(root, encoding="unicode"))
-
-
-def load_spec(text: str) -> mujoco.MjSpec:
-    try:
-        return mujoco.MjSpec.from_string(text)
-    except (ValueError, mujoco.FatalError) as error:
-        raise RobotFileError(one_line(error)) from error
-
-
-def load_mjcf(path: pathlib.Path, root: ElementTree.Element, notes: list[str]) -> mujoco.MjSpec:
-    """An MJCF file and what it includes, without geoms of meshes that are missing."""
-    check_references(path.parent.resolve(), path.parent, root, set())
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-    except (ValueError, mujoco.FatalError) as error:
-        raise RobotFileError(one_line(error)) from error
-    folder = path.parent / (spec.meshdir or "")
-    missing = {mesh.name: mesh for mesh in spec.meshes if mesh.file and not (folder / mesh.file).exists()}
-    for body in spec.bodies:
-        for geom in list(body.geoms):
-            if body.explicitinertial or geom.meshname in missing:
-                spec.delete(geom)
-    for mesh in list(spec.meshes):
-        if mesh.name in missing or not any(geom.meshname == mesh.name for geom in spec.geoms):
-            spec.delete(mesh)
-    if missing:
-        notes.append(f"meshes that are missing: {', '.join(sorted(missing))}")
-    return spec
-
-
 def name_all(spec: mujoco.MjSpec) -> None:
     """Names bodies that have no name, as MJCF allows, by number; and joints after their body."""
     bodies, joints = {body.name for body in spec.bodies}, {joint.name for joint in spec.joints}
@@ -198,27 +152,6 @@ def name_all(spec: mujoco.MjSpec) -> None:
             endings = itertools.chain([""], (f"_{i}" for i in itertools.count(2)))
             joint.name = joint.name or next(name for ending in endings if (name := body.name + ending) not in joints)
             joints.add(joint.name)
-
-
-def check_references(folder: pathlib.Path, where: pathlib.Path, root: ElementTree.Element, seen: set[pathlib.Path]) -> None:
-    """Raises RobotFileError where a file refers to one outside `folder`, and follows its includes."""
-    compiler = root.find("compiler")
-    directories = [compiler.get(name, "") for name in ("meshdir", "texturedir", "assetdir")] if compiler is not None else []
-    for element in root.iter():
-        name = element.get("file")
-        if not name:
-            continue
-        for directory in ("", *directories):
-            target = (where / directory / name).resolve()
-            if not target.is_relative_to(folder):
-                raise RobotFileError(f"<{element.tag} file={name!r}> is outside the file's folder")
-        target = (where / name).resolve()
-        if element.tag == "include":
-            if target in seen:
-                raise RobotFileError(f"<include file={name!r}> includes itself")
-            seen.add(target)
-            if target.exists():
-                check_references(folder, where, parse_xml(target), seen)
 
 
 def remove_all_but_bodies(spec: mujoco.MjSpec) -> None:
@@ -279,11 +212,17 @@ def fix_joints(spec: mujoco.MjSpec, moving: list[mujoco.MjsBody], notes: list[st
                 spec.delete(joint)
     if fixed:
         notes.append(f"joints fixed at 0: {', '.join(fixed)}")
+
+
+def check_joints(moving: list[mujoco.MjsBody], moved_by: Mapping[str, str]) -> None:
+    """Raises RobotFileError unless `moving` has one to seven hinges, none of them moved by another joint."""
     kinds = {mujoco.mjtJoint.mjJNT_SLIDE: "prismatic", mujoco.mjtJoint.mjJNT_BALL: "a ball joint"}
     for body in moving:
         for joint in body.joints:
             if joint.type != mujoco.mjtJoint.mjJNT_HINGE:
                 raise RobotFileError(f"joint {joint.name}: is {kinds[joint.type]}; expected hinges between base and tip")
+            if joint.name in moved_by:
+                raise RobotFileError(f"joint {joint.name}: follows {moved_by[joint.name]}; expected independent joints")
     count = sum(len(body.joints) for body in moving)
     if not 1 <= count <= MAX_JOINTS:
         raise RobotFileError(f"{count} hinges between base and tip: expected 1 to {MAX_JOINTS}")
@@ -294,6 +233,19 @@ def check_masses(spec: mujoco.MjSpec, moving: list[mujoco.MjsBody]) -> None:
     for body in moving:
         if body.joints and not body.geoms and (body.mass < _MIN_INERTIA or not body.explicitinertial):
             raise RobotFileError(f"link {body.name}: moves and has no mass (no inertia in the file, meshes missing)")
+
+
+def note_other_forces(spec: mujoco.MjSpec, moving: list[mujoco.MjsBody], notes: list[str]) -> None:
+    """Says which of a file's forces a chain does not have."""
+    sprung = [joint.name for body in moving for joint in body.joints if np.any(joint.stiffness)]
+    floating = [body.name for body in moving if body.gravcomp]
+    if sprung:
+        notes.append(f"springs of joints left out: {', '.join(sprung)}")
+    if floating:
+        notes.append(f"gravity compensation of links left out: {', '.join(floating)}")
+    if not np.allclose(spec.option.gravity, GRAVITY):
+        gravity = " ".join(f"{value:g}" for value in spec.option.gravity)
+        notes.append(f"gravity of the file left out: {gravity}; policies were trained with {GRAVITY[2]:g} along z")
 
 
 def check_chain(chain: Chain, model: mujoco.MjModel, joints: list, notes: list[str]) -> Chain:
@@ -347,10 +299,8 @@ def relative_to(chain: Chain, model: mujoco.MjModel, base: str) -> Chain:
 def main() -> None:
     path, (base, tip) = sys.argv[1], json.loads(sys.argv[2])
     try:
-        robot = read_robot_here(pathlib.Path(path), base, tip)
-        chain = {field.name: getattr(robot.chain, field.name).tolist() for field in dataclasses.fields(robot.chain)}
-        answer = {"chain": chain, "joints": robot.joints, "base": robot.base, "tip": robot.tip, "notes": robot.notes}
-    except (RobotFileError, ChainError) as error:
+        answer = describe_robot(read_robot_here(pathlib.Path(path), base, tip))
+    except (ValueError, mujoco.FatalError) as error:  # RobotFileError among them
         answer = {"error": one_line(error)}
     print(json.dumps(answer))
 

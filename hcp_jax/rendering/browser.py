@@ -2,6 +2,7 @@
 
 import math
 import pathlib
+import socket
 import time
 
 import mujoco
@@ -10,6 +11,7 @@ import trimesh
 
 from hcp_jax.config import ArmConfig, ArmPoolConfig, ConfigError
 from hcp_jax.envs.arm import CTRL_DT
+from hcp_jax.errors import one_line
 from hcp_jax.experiment.arm import ArmExperiment
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.experiment.chosen_robots import heldout_kinds
@@ -41,10 +43,20 @@ def open_view(folder: pathlib.Path, host: str, port: int, best: bool = False) ->
     config = run_folder.read_config(folder)
     if config.task == "hopper":
         raise ConfigError(f"{folder}: a policy of hoppers; the view shows arms (hcp_jax.render films hoppers)")
+    check_host(host)
     run = make_experiment(config)
     assert isinstance(run, ArmExperiment)
     params = run.learner.policy(load_policy(folder, run, best)[1])
     return ArmView(viser.ViserServer(host=host, port=port, label=config.name, verbose=False), run, params)
+
+
+def check_host(host: str) -> None:
+    """Raises ConfigError unless a server can listen at `host`; viser would wait for ever."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        socket.create_server((host, 0), family=family).close()
+    except OSError as error:
+        raise ConfigError(f"--host={host}: expected an address of this machine ({one_line(error)})") from error
 
 
 class ArmView:

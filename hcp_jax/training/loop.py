@@ -22,6 +22,7 @@ import numpy as np
 from hcp_jax.config import Config
 from hcp_jax.devices import any_process, do_in_main, is_main
 from hcp_jax.errors import NonFiniteError, PhysicsOverflowError
+from hcp_jax.experiment.arm import load_own_robot
 from hcp_jax.experiment.base import Experiment, TrainingState
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training import run_folder
@@ -80,6 +81,8 @@ def train(
         NonFiniteError: losses or gradients stopped being finite; the newest checkpoint is from before.
     """
     do_in_main(lambda: run_folder.check_resumable(folder, config) if resume else run_folder.check_new(folder))
+    if config.robot:
+        load_own_robot(config)  # what is wrong with it is said before all else is compiled
     goes_on = resume and latest_iteration(folder / run_folder.CHECKPOINT_FOLDER) is not None
     init = load_init(config) if config.init and not goes_on else None
     say(f"{config.name}: compiling {config.pool.num_robots + config.pool.num_heldout} robots")

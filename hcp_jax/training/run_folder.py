@@ -1,6 +1,7 @@
 """The run folder: what is written at its start, and what is checked before anything is."""
 
 import contextlib
+import dataclasses
 import fcntl
 import importlib.metadata
 import json
@@ -16,12 +17,16 @@ import jax
 from hcp_jax.config import Config, from_dict, to_dict
 from hcp_jax.devices import count_cores
 from hcp_jax.errors import UserError
+from hcp_jax.experiment.arm import load_own_robot
+from hcp_jax.hardware.catalogue import catalogue_names
+from hcp_jax.hardware.robot_file import describe_robot, save_robot
 
 CONFIG_FILE = "config.json"
 ENVIRONMENT_FILE = "environment.json"
 CHECKPOINT_FOLDER = "checkpoints"
 POLICY_FILE = "policy.msgpack"  # of a published policy, which has no checkpoints
 LOCK_FILE = ".lock"
+ROBOT_FOLDER = "robot"  # of a run on somebody's arm: what its file said when the run started
 # Fields that a resumed run may change.
 _CHANGEABLE = {"total_env_steps", "keep_checkpoints"}
 _PACKAGES = ("jax", "jaxlib", "mujoco", "mujoco-mjx", "warp-lang", "brax", "flax", "optax", "orbax-checkpoint", "numpy")
@@ -42,14 +47,23 @@ def check_resumable(folder: pathlib.Path, config: Config) -> None:
     saved = read_config(folder)
     if (folder / POLICY_FILE).exists():
         raise RunFolderError(f"--resume: {folder} is a published policy; start a new run from it with --config.init={folder}")
+    of_robot = {"robot", "robot_base", "robot_tip"} if saved.robot and config.robot else set()
     for name, old, new in find_differences(saved, config):
-        if name not in _CHANGEABLE:
+        if name not in _CHANGEABLE | of_robot:
             raise RunFolderError(f"--resume: {folder} was started with {name}={old!r}, not {new!r}")
+    if of_robot and describe_robot(load_own_robot(saved)) != describe_robot(load_own_robot(config)):
+        raise RunFolderError(f"--resume: {folder} was started with another arm than robot={config.robot!r} is now")
 
 
 def find_differences(one: Config, other: Config) -> list[tuple[str, object, object]]:
-    """Dotted names of the fields in which two configs differ, with both values; None is that of a field which one lacks."""
+    """Dotted names of the fields in which two configs differ, with both values; None is that of a field which one lacks.
+
+    Of an arm that is saved in a run folder, its name counts.
+    """
     old, new = _flatten(to_dict(one)), _flatten(to_dict(other))
+    for flat in (old, new):
+        if pathlib.Path(flat["robot"]).parent.name == ROBOT_FOLDER:
+            flat["robot"] = pathlib.Path(flat["robot"]).stem
     return [(name, old.get(name), new.get(name)) for name in old | new if old.get(name) != new.get(name)]
 
 
@@ -74,23 +88,36 @@ def lock(folder: pathlib.Path) -> Iterator[None]:
 
 
 def read_config(folder: pathlib.Path) -> Config:
-    """The config of a run folder. Raises RunFolderError if there is none, or none that can be read."""
+    """The config of a run folder, whose `robot` is the folder's own copy of somebody's arm.
+
+    Raises:
+        RunFolderError: there is none, or none that can be read.
+    """
     path = folder / CONFIG_FILE
     if not folder.is_dir():
         raise RunFolderError(f"{folder}: no such run folder")
     if not path.exists():
         raise RunFolderError(f"{folder}: not a run folder (it has no {CONFIG_FILE})")
     try:
-        return from_dict(Config, json.loads(path.read_text()))
+        config = from_dict(Config, json.loads(path.read_text()))
     except (ValueError, TypeError) as error:
         raise RunFolderError(f"{path}: damaged or of another version ({error})") from error
+    saved = saved_robot_path(folder, config)
+    return dataclasses.replace(config, robot=str(saved), robot_base="", robot_tip="") if saved.exists() else config
+
+
+def saved_robot_path(folder: pathlib.Path, config: Config) -> pathlib.Path:
+    """Where a run folder keeps the arm that `config.robot` names, if that is somebody's file."""
+    return folder / ROBOT_FOLDER / f"{pathlib.Path(config.robot).stem}.json"
 
 
 def write_start(folder: pathlib.Path, config: Config, physics: str) -> None:
-    """Writes `config.json` and `environment.json`."""
+    """Writes `config.json`, `environment.json`, and what the file of somebody's arm says."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / CONFIG_FILE).write_text(json.dumps(to_dict(config), indent=2) + "\n")
     (folder / ENVIRONMENT_FILE).write_text(json.dumps(describe_environment(physics), indent=2) + "\n")
+    if config.robot and config.robot not in catalogue_names():
+        save_robot(load_own_robot(config), saved_robot_path(folder, config))
 
 
 def describe_environment(physics: str) -> dict:

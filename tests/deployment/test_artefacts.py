@@ -1,5 +1,6 @@
 """What `export` writes runs without the package, and does there what the package does."""
 
+import dataclasses
 import json
 import pathlib
 import shutil
@@ -194,6 +195,14 @@ def test_ones_own_arm_keeps_the_names_of_its_joints(loaded):
     assert robot.pool.num_robots == 1
 
 
+def test_joints_may_be_called_as_other_joints_slots(loaded):
+    names = ("slot1", "slot2", "slot0", "slot3", "slot4", "slot5", "slot6")
+    robot = choose_robot(loaded[0], str(robots_path() / "arm_reacher.xml"), tip="l6")
+    model = mujoco.MjModel.from_xml_string(write_model(dataclasses.replace(robot, joints=names), 0.004, "euler"))
+    assert tuple(model.joint(i).name for i in range(7)) == tuple(model.actuator(i).name for i in range(7)) == names
+    assert [int(model.actuator(i).trnid[0]) for i in range(7)] == list(range(7))
+
+
 BAD_ROBOTS = {
     "K:0": "--robot=K:0: expected types out of A, B, C, D, E, F, G, H, I, R4, R5, R6, R7, train for reacher",
     "train:8": "--robot=train:8: expected a row from 0 to 7",
@@ -204,6 +213,8 @@ BAD_ROBOTS = {
 def test_bad_robots_and_folders_that_exist_give_one_line(arm_run, exported, tmp_path, capsys):
     for robot, expected in BAD_ROBOTS.items():
         assert expected in fails(capsys, [str(arm_run), "--robot", robot, "--out", str(tmp_path / "out")])
+    arguments = [str(arm_run), "--robot", "H:0", "--tip", "x", "--out", str(tmp_path / "out")]
+    assert "--base, --tip: go with a file" in fails(capsys, arguments)
     assert list(tmp_path.iterdir()) == []
     before = (exported / "policy.json").read_bytes()
     assert "already exists" in fails(capsys, [str(arm_run), "--robot", "H:0", "--out", str(exported)])

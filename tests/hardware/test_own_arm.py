@@ -76,6 +76,24 @@ def test_the_command_says_joints_assumptions_and_what_lies_outside(tmp_path, cap
     assert f"{len(outside)} of {len(record['entries'])} entries" in shown
 
 
+def test_brackets_in_names_and_units_are_shown(tmp_path, capsys):
+    text = TEMPLATE.read_text().replace('"j3"', '"j[/x]3"')
+    (tmp_path / "arm.xml").write_text(text)
+    robot.main(["check", str(tmp_path / "arm.xml"), "--tip", "l6"])
+    shown = capsys.readouterr().out
+    assert "j[/x]3" in shown
+    assert "z [rad]" in shown
+
+
+def test_the_arms_own_file_is_not_written_over(tmp_path, capsys):
+    (tmp_path / "arm.xml").write_text(TEMPLATE.read_text())
+    with pytest.raises(SystemExit) as exit_info:
+        robot.main(["check", str(tmp_path / "arm.xml"), "--tip", "l6", "--json", str(tmp_path / "arm.xml")])
+    assert exit_info.value.code == 2
+    assert "exists: expected a new file, or one that ends in .json" in capsys.readouterr().err
+    assert (tmp_path / "arm.xml").read_text() == TEMPLATE.read_text()
+
+
 def test_the_arms_to_compare_with_are_those_of_a_policy(finished_arms, finished_run, tmp_path, capsys):
     arguments = ["check", str(TEMPLATE), "--tip", "l6", "--json", str(tmp_path / "out.json")]
     robot.main([*arguments, "--policy", str(finished_arms)])

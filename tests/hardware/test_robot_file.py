@@ -30,7 +30,21 @@ BAD = {
               joint("j1", "l2", "l3")),
         "joint p: is prismatic",
     ),
-    "without limits": (arm(limit=""), "joint j0: revolute without limits"),
+    "without limits": (arm(limit=""), "joint j0: revolute with limits 0 to 0: expected a lower and a larger upper one"),
+    "with limits the wrong way round": (arm(limit='<limit lower="2" upper="-2"/>'), "revolute with limits 2 to -2"),
+    "with a limit that is no number": (arm(limit='<limit lower="nan" upper="1"/>'), "revolute with limits nan to 1"),
+    "with a joint that follows another": (
+        arm(3).replace('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><mimic joint="j2"/>', 2),
+        "joint j0: follows j2; expected independent joints",
+    ),
+    "with a constraint between joints": (
+        MJCF.replace("<compiler", '<equality><joint joint1="j1" joint2="j0"/></equality><compiler'),
+        "joint j1: follows j0; expected independent joints",
+    ),
+    "a xacro template": (
+        '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="a" value="1"/></robot>',
+        "is a xacro template",
+    ),
     "without mass": (
         robot(link("l0"), '<link name="l1"/>', joint("j0", "l0", "l1")),
         "link l1: moves and has no mass",
@@ -74,9 +88,11 @@ def test_what_is_no_serial_arm_is_said_in_one_line(kind, tmp_path):
     assert "\n" not in str(error.value)
 
 
-def test_a_missing_file_and_a_missing_tip_are_said(tmp_path):
+def test_a_missing_file_a_name_twice_and_a_missing_tip_are_said(tmp_path):
     with pytest.raises(RobotFileError, match="No such file"):
         read_robot(tmp_path / "nothing.urdf")
+    with pytest.raises(RobotFileError, match="repeated name 'j0' in joint"):
+        read_robot(write(tmp_path, arm().replace('"j1"', '"j0"')))
     with pytest.raises(RobotFileError, match="--tip=hand: no such link; there are l0, l1, l2"):
         read_robot(write(tmp_path, arm()), tip="hand")
 
@@ -108,6 +124,21 @@ def test_what_a_file_leaves_open_is_assumed_and_said(tmp_path):
     np.testing.assert_allclose(robot_file.chain.torque_limit, 80.0)
     np.testing.assert_allclose(robot_file.chain.damping, [1.0, 0.5])
     np.testing.assert_allclose(robot_file.chain.joint_range, [[-np.pi, np.pi]] * 2)
+
+
+def test_forces_that_a_chain_does_not_have_are_said(tmp_path):
+    text = MJCF.replace('name="j0"', 'name="j0" stiffness="3"').replace('name="l2"', 'name="l2" gravcomp="1"')
+    notes = read_robot_here(write(tmp_path, text.replace("<compiler", '<option gravity="0 0 0"/><compiler')), None, None).notes
+    assert "springs of joints left out: j0" in notes
+    assert "gravity compensation of links left out: l2" in notes
+    assert any(note.startswith("gravity of the file left out: 0 0 0") for note in notes)
+    assert not any("left out" in note for note in read_robot_here(write(tmp_path, MJCF), None, None).notes)
+
+
+def test_pictures_may_be_missing(tmp_path):
+    wood = '<asset><texture name="w" type="2d" file="wood.png"/><material name="w" texture="w"/>'
+    text = MJCF.replace("<asset>", wood).replace('<geom type="mesh" mesh="m"/>', '<geom size="0.1" material="w"/>')
+    np.testing.assert_array_equal(read_robot(write(tmp_path, text)).chain.mass, read_robot(write(tmp_path, MJCF)).chain.mass)
 
 
 def test_bodies_and_joints_may_be_without_a_name(tmp_path):

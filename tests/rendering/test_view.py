@@ -72,9 +72,10 @@ def fails(capsys, arguments) -> str:
     return error
 
 
-def test_bad_arguments_give_one_line(finished_run, tmp_path, capsys):
+def test_bad_arguments_give_one_line(finished_run, finished_arms, tmp_path, capsys):
     assert "the view shows arms" in fails(capsys, [finished_run])
     assert "--port=0: expected 1 to 65535" in fails(capsys, [finished_run, "--port", "0"])
+    assert "--host=10.99.99.99: expected an address of this machine" in fails(capsys, [finished_arms, "--host", "10.99.99.99"])
     assert "no such run folder" in fails(capsys, [tmp_path / "nowhere"])
 
 

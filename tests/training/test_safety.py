@@ -76,5 +76,7 @@ def test_a_folder_that_cannot_be_written_is_said_in_one_line(tmp_path, capsys):
         train.main(["--config", str(HOPPER), "--out", str(tmp_path / "file" / "run"),
                     "--config.pool.num_robots=8", "--config.pool.num_heldout=2"])  # fmt: skip
     error = capsys.readouterr().err
-    assert exit_info.value.code == 1
+    assert exit_info.value.code == 2
+    assert "--out: " in error
+    assert "cannot be written (Not a directory)" in error
     assert error.count("\n") == 1, error
