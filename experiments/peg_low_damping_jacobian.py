@@ -6,4 +6,4 @@ from hcp_jax.config import Config
 
 def get_config() -> Config:
     pool = presets.only_dynamics(damping=(0.01, 2.0))
-    return presets.type_i("peg_low_damping_jacobian", "peg_insertion", "chain_fk+jacobian", pool, total_env_steps=1_280_000)
+    return presets.type_i("peg_low_damping_jacobian", "peg_insertion", "chain_fk+jacobian", pool)
