@@ -31,7 +31,6 @@ OLDER = {
         },
     ),
     "random_peg_film_leave_e_s0": ("trained before the mean of the actors was over more iterations", {"ddpg.actor_average"}),
-    "peg_film_leave_e_s0": ("trained before the mean of the actors was over yet more iterations", {"ddpg.actor_average"}),
 }
 
 
