@@ -101,6 +101,7 @@ class DDPG:
         num_envs: int,
         num_iterations: int,
         embedding_learning_rate: float,
+        learns_statistics: bool = True,
     ):
         """Args:
         env: a goal-conditioned environment over a pool.
@@ -109,6 +110,7 @@ class DDPG:
         num_envs: episodes collected per iteration.
         num_iterations: length of the run, for the learning rates' decay.
         embedding_learning_rate: Adam's step for a learned v_h.
+        learns_statistics: else those of the inputs stay as they are in the first state, as layers want that come from another run.
         """
         self.env, self.conditioning, self.config, self.num_envs = env, conditioning, config, num_envs
         if config.network == "joints":
@@ -118,7 +120,7 @@ class DDPG:
             film_from = env.observation_size + env.goal_size if config.network == "film" else None
             self.actor = DeterministicActor(config.hidden_sizes, env.action_size, config.layer_norm, film_from)
             self.critic = Critic(config.hidden_sizes, config.layer_norm, film_from)
-        self._num_iterations = num_iterations
+        self._num_iterations, self._learns_statistics = num_iterations, learns_statistics
         self._optimizer = make_ddpg_optimizer(config, num_iterations, embedding_learning_rate)
         self._explorer = Explorer(env, self._explored_action, config, num_envs)
         self.train = jax.jit(self._train, donate_argnums=0, compiler_options=options_for_batch(config.batch_size))
@@ -180,11 +182,14 @@ class DDPG:
     def _train_iteration(self, state: DDPGState) -> DDPGState:
         key, key_play, key_update, key_inputs = jax.random.split(state.key, 4)
         played = self._explorer.play((state.params, state.statistics), state.failure, self._is_warm(state), key_play)
-        inputs, weights = self._draw_inputs(state.params["embedding"], played.episodes, key_inputs)
+        statistics = state.statistics
+        if self._learns_statistics:
+            inputs, weights = self._draw_inputs(state.params["embedding"], played.episodes, key_inputs)
+            statistics = running_statistics.update(statistics, inputs, weights=weights)
         state = state.replace(
             iteration=state.iteration + 1,
             key=key,
-            statistics=running_statistics.update(state.statistics, inputs, weights=weights),
+            statistics=statistics,
             replay=add_episodes(state.replay, played.episodes),
             failure=played.failure,
             diverged=state.diverged.at[played.episodes.index].add(played.diverged.astype(jnp.int32)),

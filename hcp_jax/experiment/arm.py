@@ -140,6 +140,7 @@ def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:
         config.resolved_num_envs,
         num_iterations,
         config.embedding.learning_rate,
+        learns_statistics=not config.init,
     )
     check_memory(config, replay_bytes(learner.buffer_shapes()))
     evaluator = make_evaluator(config, learner, make_env, heldout_pool, train_pool)

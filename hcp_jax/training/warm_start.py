@@ -21,7 +21,8 @@ from hcp_jax.training.policy_file import load_policy
 def load_init(config: Config) -> Callable[[Any, TrainingState], TrainingState]:
     """Reads the run that `config.init` names; the result, called with an experiment, writes its layers into a new run's state.
 
-    Hidden layers and statistics carry over; output layers and the log standard deviation only if `config.init_layers` is
+    Hidden layers and the inputs' statistics carry over (an arm's run keeps these as they are: the layers were trained with inputs of
+    that scale); output layers and the log standard deviation only if `config.init_layers` is
     `all`; every robot's own v_h is new.
 
     Raises:

@@ -244,6 +244,16 @@ def test_arms_start_from_the_layers_of_another_run(finished_arms, tiny_arms):
     jax.tree.map(np.testing.assert_array_equal, load_init(config)(run, run.init_state()).params, source.params)
 
 
+def test_an_arms_run_from_another_ones_layers_keeps_its_statistics(finished_arms, tiny_arms):
+    config = dataclasses.replace(tiny_arms, init=str(finished_arms), init_layers="all")
+    for started, changes in ((config, False), (tiny_arms, True)):
+        run = loop.make_experiment(started)
+        state = load_init(config)(run, run.init_state())
+        before = np.asarray(state.statistics.mean)
+        after = np.asarray(run.learner.train(state, 1).statistics.mean)
+        assert (before != after).any() == changes
+
+
 def test_arms_start_from_the_mean_of_the_actors(finished_arms, tiny_arms, monkeypatch):
     run = loop.make_experiment(tiny_arms)
     iteration, source = load_policy(finished_arms, run)
