@@ -110,7 +110,7 @@ class DDPG:
         num_envs: episodes collected per iteration.
         num_iterations: length of the run, for the learning rates' decay.
         embedding_learning_rate: Adam's step for a learned v_h.
-        learns_statistics: else those of the inputs stay as they are in the first state, as layers want that come from another run.
+        learns_statistics: else those of the inputs stay as they are in the first state.
         """
         self.env, self.conditioning, self.config, self.num_envs = env, conditioning, config, num_envs
         if config.network == "joints":

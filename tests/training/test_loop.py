@@ -249,7 +249,7 @@ def test_an_arms_run_from_another_ones_layers_keeps_its_statistics(finished_arms
     for started, changes in ((config, False), (tiny_arms, True)):
         run = loop.make_experiment(started)
         state = load_init(config)(run, run.init_state())
-        before = np.asarray(state.statistics.mean)
+        before = np.array(state.statistics.mean)
         after = np.asarray(run.learner.train(state, 1).statistics.mean)
         assert (before != after).any() == changes
 
