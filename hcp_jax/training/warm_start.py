@@ -22,8 +22,8 @@ def load_init(config: Config) -> Callable[[Any, TrainingState], TrainingState]:
     """Reads the run that `config.init` names; the result, called with an experiment, writes its layers into a new run's state.
 
     Hidden layers and statistics of the inputs carry over; an arm's run keeps these as they are, since the layers were trained
-    with inputs of that scale. Output layers and the log standard deviation carry over only if `config.init_layers` is `all`; every
-    robot's own v_h is new.
+    with inputs of that scale. Output layers and the log standard deviation carry over only if `config.init_layers` is
+    `all`; every robot's own v_h is new.
 
     Raises:
         RunFolderError, CheckpointError: that run cannot be read, or its hidden layers do not fit `config`.
