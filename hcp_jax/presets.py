@@ -204,6 +204,5 @@ def finetune_peg(name: str, robot_type: str, init: str) -> Config:
         critic_learning_rate=3e-4,
         warmup_episodes=0,
         n_step_from=0.0,  # it need not be tempted to try: it knows where to go
-        actor_average=0.8,
     )
     return scratch_peg(name, robot_type, total_env_steps=1_280_000, init=init, init_layers="all", ddpg=ddpg)
