@@ -75,15 +75,15 @@ def check_options(options: argparse.Namespace, config: Config) -> None:
     check_types(config, options.types or ())
     if options.pool and options.range:
         raise ConfigError("--range: not with --pool, whose robots are drawn already")
+    if (options.fit_steps or 0) < 0:
+        raise ConfigError(f"--fit-steps={options.fit_steps}: expected at least 0")
+    if min(options.first_steps, default=1) < 1:
+        raise ConfigError(f"--first-steps={min(options.first_steps)}: expected at least 1")
     for name in ("first_steps", "fit_steps"):
         if getattr(options, name) and config.task != "hopper":
             raise ConfigError(f"--{name.replace('_', '-')}: goes with a policy of hoppers")
-    if min(options.first_steps, default=1) < 1:
-        raise ConfigError(f"--first-steps={min(options.first_steps)}: expected at least 1")
     if (options.base or options.tip) and options.robot is None:
         raise ConfigError("--base, --tip: go with --robot")
-    if (options.fit_steps or 0) < 0:
-        raise ConfigError(f"--fit-steps={options.fit_steps}: expected at least 0")
     if options.robot is not None and (config.task == "hopper" or options.types or options.pool or options.range):
         raise ConfigError("--robot: goes with a policy of arms, and not with --types, --pool or --range")
 

@@ -255,7 +255,8 @@ def test_ctrl_c_in_a_runs_last_seconds_ends_the_sweep_after_it(tiny_config, tmp_
         (["--tip", "hand"], "--base, --tip: go with --robot"),
         (["--fit-steps", "-5"], "--fit-steps=-5: expected at least 0"),
         (["--first-steps", "50", "-3"], "--first-steps=-3: expected at least 1"),
-        (["--robot", ""], "--robot: goes with a policy of arms"),
+        (["--fit-steps", "5"], "--fit-steps: goes with a policy of hoppers"),
+        (["--robot", ""], "no name: no such file, and no arm of the catalogue: "),
     ],
 )
 def test_options_that_would_be_ignored_are_refused(arguments, expected, capsys):

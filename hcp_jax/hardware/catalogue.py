@@ -21,9 +21,8 @@ def find_robot(name: str | pathlib.Path) -> pathlib.Path:
         return robots_path() / "catalogue" / f"{name}.urdf"
     path = pathlib.Path(name)
     if not str(name) or not path.exists():
-        raise RobotFileError(
-            f"{str(name) or '(no name)'}: no such file, and no arm of the catalogue: {', '.join(catalogue_names())}"
-        )
+        known = ", ".join(catalogue_names())
+        raise RobotFileError(f"{str(name) or 'no name'}: no such file, and no arm of the catalogue: {known}")
     return path
 
 
