@@ -8,4 +8,5 @@ from hcp_jax.config import Config
 
 
 def get_config() -> Config:
-    return presets.finetune_peg("random_peg_finetune_h", "H", init="results/policies/random_peg_aligned_leave_h_s0")
+    init = "results/policies/random_peg_film_leave_h_s0"
+    return presets.finetune_peg("random_peg_finetune_h", "H", init=init, network="film")

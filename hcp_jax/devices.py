@@ -72,6 +72,11 @@ def any_process(flag: bool) -> bool:
     return flag if jax.process_count() == 1 else bool(multihost_utils.process_allgather(np.asarray(flag)).any())
 
 
+def from_main(number: int) -> int:
+    """`number` as process 0 has it. Every process must call it, and waits for process 0."""
+    return number if jax.process_count() == 1 else int(multihost_utils.broadcast_one_to_all(np.asarray(number)))
+
+
 def do_in_main(action: Callable[[], None]) -> None:
     """Runs `action` in process 0 alone, while the others wait. Where it raises an exception, they raise a JoinError."""
     error = None

@@ -190,16 +190,18 @@ def film_peg(name: str, **changes) -> Config:
     return aligned_peg(name, ddpg=dataclasses.replace(FAST_PEG_DDPG, network="film", actor_average=0.985), **changes)
 
 
-def scratch_peg(name: str, robot_type: str, **changes) -> Config:
+def scratch_peg(name: str, robot_type: str, network: str = "flat", **changes) -> Config:
     """Peg insertion into a random hole with arms of one type alone, from the start. `changes` are those of `arm`."""
-    schedule = {"total_env_steps": 3_840_000, "eval_every": 128_000}
+    ddpg = dataclasses.replace(FAST_PEG_DDPG, network=network)
+    schedule = {"total_env_steps": 3_840_000, "eval_every": 128_000, "ddpg": ddpg}
     return aligned_peg(name, **({"random_hole": RANDOM_HOLE, "pool": only(robot_type)} | schedule | changes))
 
 
-def finetune_peg(name: str, robot_type: str, init: str) -> Config:
+def finetune_peg(name: str, robot_type: str, init: str, network: str = "flat") -> Config:
     """`scratch_peg` from the policy in folder `init`: a third of its steps, smaller updates, five-step returns throughout."""
     ddpg = dataclasses.replace(
         FAST_PEG_DDPG,
+        network=network,
         actor_learning_rate=1e-4,
         critic_learning_rate=3e-4,
         warmup_episodes=0,

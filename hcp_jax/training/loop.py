@@ -3,7 +3,7 @@
 train(config, folder):
   build pools, compile                     said on the first lines
   until all iterations are done:
-    learner.train(state, chunk)              one jitted call, a progress line after it
+    learner.train(state, chunk)              one jitted call of some seconds, a progress line after it
     at every eval_every steps:             evaluate, metrics.csv, checkpoint
 """
 
@@ -13,6 +13,7 @@ import math
 import pathlib
 import signal
 import threading
+import time
 from collections.abc import Iterator
 
 import jax
@@ -20,7 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hcp_jax.config import Config
-from hcp_jax.devices import any_process, do_in_main, is_main
+from hcp_jax.devices import any_process, do_in_main, from_main, is_main
 from hcp_jax.errors import NonFiniteError, PhysicsOverflowError
 from hcp_jax.experiment.arm import load_own_robot
 from hcp_jax.experiment.base import Experiment, TrainingState
@@ -32,8 +33,7 @@ from hcp_jax.training.metrics import MetricsWriter
 from hcp_jax.training.progress import Progress, format_seconds, say
 from hcp_jax.training.warm_start import load_init
 
-# Control steps between two progress lines: a few seconds of work.
-_CHUNK_ENV_STEPS = 250_000
+_CHUNK_SECONDS = 5.0  # of training between two progress lines, and until Ctrl-C is heard; at least one iteration
 _NUM_NAMED = 3  # robots that an error names
 
 
@@ -125,7 +125,7 @@ class TrainingLoop:
         config = run.config
         self._run, self._folder, self._checkpoints, self._iteration = run, folder, checkpoints, iteration
         self._batch_size = config.batch_size
-        self._chunk = max(1, round(_CHUNK_ENV_STEPS / self._batch_size))
+        self._chunk = 1  # iterations of the next jitted call
         self._eval_iterations = max(1, round(config.eval_every / self._batch_size))
         self._metrics = MetricsWriter(folder, self._env_steps) if is_main() else None
         self._progress = Progress(run.num_iterations * self._batch_size, self._env_steps)
@@ -145,9 +145,11 @@ class TrainingLoop:
         while self._iteration < run.num_iterations:
             next_eval = min((self._iteration // self._eval_iterations + 1) * self._eval_iterations, run.num_iterations)
             count = min(self._chunk, next_eval - self._iteration)
+            began = time.monotonic()
             state = run.learner.train(state, count)
             self._iteration += count
             self._check(state)
+            self._chunk = from_main(max(1, int(count * _CHUNK_SECONDS / (time.monotonic() - began))))
             self._progress.update(self._env_steps, run.describe(state))
             if self._iteration == next_eval:
                 state, metrics = self._evaluate(state)

@@ -1,9 +1,11 @@
-"""What a run says while it works, in process 0: one line at a time, rewritten in place on a terminal."""
+"""What a run says while it works, in process 0: a line that is rewritten on a terminal, one now and then in a file."""
 
 import sys
 import time
 
 from hcp_jax.devices import is_main
+
+_FILE_SECONDS = 20.0  # between two progress lines where the last one cannot be rewritten
 
 
 def say(text: str) -> None:
@@ -18,6 +20,7 @@ class Progress:
     def __init__(self, total_env_steps: int, start_env_steps: int = 0):
         self._total, self._start = total_env_steps, start_env_steps
         self._began = time.monotonic()
+        self._next_in_file = self._began
         self._open_line = False
 
     @property
@@ -47,8 +50,9 @@ class Progress:
         if sys.stdout.isatty():
             print(f"\r\033[K{line}", end="", flush=True)
             self._open_line = True
-        else:
+        elif time.monotonic() >= self._next_in_file:
             print(line, flush=True)
+            self._next_in_file = time.monotonic() + _FILE_SECONDS
 
     def steps_per_second(self, env_steps: int) -> float:
         return (env_steps - self._start) / max(self.elapsed, 1e-9)

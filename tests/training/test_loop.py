@@ -52,7 +52,7 @@ def test_the_newest_checkpoints_and_the_best_are_kept(finished_run, tiny_config)
 
 
 @pytest.mark.parametrize("cut", [3, *(pytest.param(cut, marks=pytest.mark.slow) for cut in (2, 5))])
-def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished_run, tiny_config, tmp_path, cut):
+def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished_run, tiny_config, tmp_path, monkeypatch, cut):
     """Cut after `cut` of 8 iterations: between two evaluations and at one."""
     folder = tmp_path / "run"
     run = loop.make_experiment(tiny_config)
@@ -60,7 +60,7 @@ def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished_ru
     checkpoints = Checkpoints(folder / "checkpoints")
     loop.run_folder.write_start(folder, tiny_config, run.physics)
     training = TrainingLoop(run, folder, checkpoints, 0)
-    training._chunk = 1
+    monkeypatch.setattr(loop, "_CHUNK_SECONDS", 0.0)
     train_step = run.ppo.train
 
     def train_and_interrupt(state, count):
@@ -76,6 +76,24 @@ def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished_ru
     seconds = [float(row["seconds"]) for row in read_rows(folder / "timing.csv")]
     assert seconds == sorted(seconds), "the clock goes on where it stopped"
     assert read_wall_seconds(folder) == seconds[-1]
+
+
+def test_a_jitted_call_trains_for_some_seconds_whatever_an_iteration_takes(tiny_config, tmp_path, monkeypatch):
+    clock, counts = [0.0], []
+    monkeypatch.setattr(loop.time, "monotonic", lambda: clock[0])
+    run = loop.make_experiment(dataclasses.replace(tiny_config, eval_every=tiny_config.total_env_steps))
+    training = TrainingLoop(run, tmp_path, Checkpoints(tmp_path / "checkpoints"), 0)
+    monkeypatch.setattr(training, "_evaluate", lambda state: (state, {}))
+    monkeypatch.setattr(training, "_finish", lambda: None)
+
+    def train_for(state, count):
+        counts.append(count)
+        clock[0] += 0.4 * loop._CHUNK_SECONDS * count if len(counts) < 4 else 10 * loop._CHUNK_SECONDS
+        return state
+
+    run.ppo.train = train_for
+    training.run(run.init_state(), Interrupt())
+    assert counts == [1, 2, 2, 2, 1]
 
 
 def test_rows_written_after_the_last_checkpoint_are_dropped_on_resume(finished_run, tiny_config, tmp_path):
