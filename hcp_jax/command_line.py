@@ -22,6 +22,7 @@ from hcp_jax.physics.base import INTEGRATORS, PHYSICS
 
 BAD_INPUT, BROKEN = 2, 1
 OWN_ARM = f"your arm, a URDF or MJCF file (see hcp_jax.robot check), or one of {', '.join(catalogue_names())}"
+_RUN_BY = {"get_config": "hcp_jax.train", "get_configs": "hcp_jax.sweep"}  # what an experiment file defines
 _OVERRIDE = re.compile(r"--config\.([^=\s]+)(=.*)?$", re.DOTALL)
 
 
@@ -118,31 +119,34 @@ def load_config(path: str, overrides: Sequence[str] = ()) -> Config:
     Raises:
         ConfigError: the file is missing, raises or gives no `Config`; a field is unknown or its value ill-typed.
     """
-    return apply_overrides(_run_experiment(path, "get_config", Config), overrides)
+    return apply_overrides(_run_experiment(f"--config={path}", path, "get_config", Config), overrides)
 
 
 def load_configs(path: str) -> list[Config]:
-    """Runs an experiment list: a Python file whose `get_configs()` gives several `Config`s."""
-    configs = _run_experiment(path, "get_configs", list)
+    """Runs an experiment list: a Python file whose `get_configs()` gives several `Config`s. Raises ConfigError."""
+    configs = _run_experiment(path, path, "get_configs", list)
     for config in configs:
         if not isinstance(config, Config):
-            raise ConfigError(f"--config={path}: get_configs() gave {type(config).__name__}, expected Config")
+            raise ConfigError(f"{path}: get_configs() gave a list with {type(config).__name__}, expected Config")
     return configs
 
 
-def _run_experiment(path: str, function: str, kind: type):
+def _run_experiment(said: str, path: str, function: str, kind: type):
+    """What `function` of the file gives. `said` is how errors call it."""
     if not pathlib.Path(path).is_file():
-        raise ConfigError(f"--config={path}: no such file")
+        raise ConfigError(f"{said}: no such file")
     try:
-        result = runpy.run_path(path)[function]()
-    except KeyError as error:
-        raise ConfigError(f"--config={path}: KeyError: {error} (an experiment file defines {function}())") from error
+        defined = runpy.run_path(path)
+        if function not in defined:
+            other = next((f" but {name}(), which is for {command}" for name, command in _RUN_BY.items() if name in defined), "")
+            raise ConfigError(f"{said}: defines no {function}(){other}")
+        result = defined[function]()
     except UserError:
         raise
     except (Exception, SystemExit) as error:
-        raise ConfigError(f"--config={path}: raised {type(error).__name__}: {error}") from error
+        raise ConfigError(f"{said}: raised {type(error).__name__}: {error}") from error
     if not isinstance(result, kind):
-        raise ConfigError(f"--config={path}: {function}() gave {type(result).__name__}, expected {kind.__name__}")
+        raise ConfigError(f"{said}: {function}() gave {type(result).__name__}, expected {kind.__name__}")
     return result
 
 

@@ -101,7 +101,7 @@ FAST_PEG_DDPG = dataclasses.replace(
     random_action_probability=0.2,
 )
 # As many samples in the paper's small batches, which a CPU core works through as fast: the training types are learned in fewer
-# steps, but on the peg policies carry over to other types less well (docs/reproducing.md).
+# steps, but on the peg policies carry over to other types less well (docs/ablations.md).
 SMALL_BATCHES = {"batch_size": 128, "updates_per_iteration": 1280, "tau": 0.01}
 FAST_NUM_ENVS = 128
 # Steps and evaluations of a training, by task. The peg is learned from a reverse curriculum: three episodes in ten start in
@@ -186,7 +186,7 @@ def aligned_peg(name: str, **changes) -> Config:
 
 def film_peg(name: str, **changes) -> Config:
     """`aligned_peg` with FiLM. On types that it was not trained on, an actor is far worse than the mean of itself over many
-    iterations, and that of 20 worse than that of 70 (docs/reproducing.md)."""
+    iterations, and that of 20 worse than that of 70 (docs/ablations.md)."""
     return aligned_peg(name, ddpg=dataclasses.replace(FAST_PEG_DDPG, network="film", actor_average=0.985), **changes)
 
 

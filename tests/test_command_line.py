@@ -164,7 +164,9 @@ def test_bad_arguments_give_one_line_and_write_nothing(name, tmp_path, capsys, m
     [
         ("def get_config(): raise RuntimeError('boom')", "raised RuntimeError: boom"),
         ("import nonexistent_module", "raised ModuleNotFoundError"),
-        ("x = 1", "defines get_config()"),
+        ("x = 1", "defines no get_config()"),
+        ("def get_configs(): return []", "defines no get_config() but get_configs(), which is for hcp_jax.sweep"),
+        ("def get_config(): return {}['key']", "raised KeyError: 'key'"),
         ("def get_config(): return 3", "gave int, expected Config"),
         ("def broken(:", "raised SyntaxError"),
     ],
@@ -212,6 +214,7 @@ def test_a_sweep_refuses_no_seeds_and_a_folder_of_another_setting(finished_run, 
     path = pathlib.Path(tiny_experiment(tmp_path, tiny_config))
     path.write_text(path.read_text() + "def get_configs():\n    return [get_config()]\n")
     arguments = [str(path), "--out", str(tmp_path / "runs")]
+    assert "list.py: no such file" in fails(capsys, sweep.main, ["list.py"])
     assert "--seeds=0: expected at least 1" in fails(capsys, sweep.main, [*arguments, "--seeds", "0"])
     shutil.copytree(finished_run, tmp_path / "runs" / "tiny_s0")
     line = fails(capsys, sweep.main, [*arguments, "--config.ppo.gamma=0.5"])

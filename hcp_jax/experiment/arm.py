@@ -101,9 +101,9 @@ class ArmExperiment:
         }
 
     def describe(self, state: DDPGState) -> str:
-        """Success of exploring episodes since the last evaluation, for the progress line."""
+        """Success of exploring episodes since the last evaluation, approach starts among them, for the progress line."""
         episodes = float(state.sums["episodes"])
-        return f"success {100.0 * float(state.sums['successes']) / episodes:>5.1f} %" if episodes else "success   n/a"
+        return f"exploring succeeds in {100.0 * float(state.sums['successes']) / episodes:>5.1f} %" if episodes else "exploring"
 
 
 def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:

@@ -1,0 +1,119 @@
+"""The tables of README and docs say what the files under results/ say."""
+
+import json
+import pathlib
+import re
+
+import numpy as np
+import pytest
+
+from hcp_jax.training.metrics import read_rows
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+RESULTS = ROOT / "results"
+ROMAN = ("I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX", "X", "XI", "XII", "XIII", "XIV", "XV", "XVI")
+PLAIN = re.compile(r"[`*]")
+
+
+def read_tables(page: str) -> list[list[dict[str, str]]]:
+    """Every table of a page, as rows by the columns' titles; a column without a title is numbered."""
+    tables, lines = [], []
+    for line in [*(ROOT / page).read_text().splitlines(), ""]:
+        if line.startswith("|"):
+            lines.append([cell.strip() for cell in line.strip().strip("|").split("|")])
+        elif lines:
+            titles = [title or str(i) for i, title in enumerate(lines[0])]
+            tables.append([dict(zip(titles, row, strict=True)) for row in lines[2:]])
+            lines = []
+    return tables
+
+
+def find_tables(page: str, *titles: str) -> list[list[dict[str, str]]]:
+    found = [table for table in read_tables(page) if table and set(titles) <= table[0].keys()]
+    assert found, f"{page}: no table with {titles}"
+    return found
+
+
+def read_json(name: str) -> list | dict:
+    return json.loads((RESULTS / name).read_text())
+
+
+def find_run(name: str) -> pathlib.Path:
+    """The folder of a run that a table names, of seed 0 where it names none."""
+    names = (name, f"{name}_s0")
+    return next(path for kind in ("arms", "ablations") for n in names if (path := RESULTS / kind / "runs" / n).is_dir())
+
+
+def read_evaluations(name: str) -> list[dict]:
+    """Of each seed of an arm run that a table names, success by type."""
+    paths = [path for kind in ("arms", "ablations") for path in (RESULTS / kind / "evaluations").glob(f"{name}*.json")]
+    paths = [path for path in paths if re.fullmatch(rf"{name}(_s\d)?", path.stem)]
+    return [json.loads(path.read_text())["types"] for path in paths]
+
+
+@pytest.mark.parametrize("row", find_tables("README.md", "Exp.", "HCP-E", "DDPG+HER")[0], ids=lambda row: row["Exp."])
+def test_a_row_of_table_1_is_two_rows_of_its_file(row):
+    table = read_json("table1.json")
+    minutes = []
+    for number, column in zip(row["Exp."].split(", "), ("HCP-E", "DDPG+HER"), strict=True):
+        runs = [
+            run for run in table if run["experiment"] == ROMAN.index(number) + 1 and run["test_type"] == row["type left out"]
+        ]
+        said = row[column].split(" (")[0]
+        same = [run for run in runs if f"{run['success_mean']:.1f} ± {run['success_std_over_trials']:.1f}" == said]
+        assert same, f"{number}: {said} is none of {[(run['success_mean'], run['success_std_over_trials']) for run in runs]}"
+        seeds = re.search(r"(\d) seeds", row[column])
+        assert len(same[0]["seeds"]) == int(seeds[1] if seeds else 1)
+        assert ("FiLM" in row[column]) == (same[0]["network"] == "film")
+        minutes.append(f"{same[0]['wall_seconds'] / 60:.0f}")
+    assert row["minutes"] == ", ".join(minutes)
+
+
+@pytest.mark.parametrize("row", find_tables("docs/results.md", "run", "masked", "H, zero-shot")[0], ids=lambda row: row["run"])
+def test_success_by_type_is_that_of_the_evaluations(row):
+    if row["run"].startswith("the paper's"):
+        return
+    seeds = read_evaluations(re.search(r"`(\w+)`", row["run"])[1])
+    assert len(seeds) == (3 if "3 seeds" in row["run"] else 1)
+    for title, said in row.items():
+        if title.split(",")[0] in "ABCDEFGHI":
+            mean = np.mean([types[title.split(",")[0]]["success_mean"] for types in seeds])
+            assert abs(float(said.split(" ±")[0]) - mean) < 0.0501, title
+
+
+@pytest.mark.parametrize("row", find_tables("README.md", "experiment", "held out")[0], ids=lambda row: row["experiment"])
+def test_hopper_returns_are_those_of_the_summary(row):
+    (run,) = [run for run in read_json("hopper/summary.json") if run["name"] == row["experiment"].strip("`")]
+    for title, name in (("robots trained on", "train"), ("held out", "heldout"), ("held out, v_h fitted", "heldout_fitted")):
+        mean, std = run[f"{name}_return_mean"], run[f"{name}_return_std"]
+        said = [int(number) for number in row[title].split(" ± ") if number]
+        assert said == ([] if mean is None else pytest.approx([mean, std], abs=0.501))
+    assert row["minutes"] == f"{run['wall_seconds'] / 60:.0f}"
+
+
+def test_success_on_the_catalogue_is_that_of_its_file():
+    chains, fine_tuned, exp_i = find_tables("README.md", "Fetch", "median")[0]
+    for robot in read_json("catalogue.json"):
+        (title,) = [title for title in chains if title.lower() == robot["robot"]]
+        (of_chains, of_exp_i), tuned = robot["zero_shot"], robot["fine_tuned"]
+        said = [float(row[title]) for row in (chains, exp_i, fine_tuned)]
+        assert said == [of_chains["success_mean"], of_exp_i["success_mean"], tuned["success_mean"]], title
+    for row in (chains, fine_tuned, exp_i):
+        numbers = [float(said) for title, said in row.items() if title not in ("0", "median")]
+        assert abs(float(row["median"]) - np.median(numbers)) < 0.0501
+
+
+CURVES = [row for table in find_tables("docs/ablations.md", "0.5 M", "1.5 M") for row in table]
+NAMED = [row for row in CURVES if "`" in list(row.values())[-1]]
+
+
+@pytest.mark.parametrize("row", NAMED, ids=lambda row: PLAIN.sub("", list(row.values())[-1]))
+def test_learning_curves_are_those_of_the_runs(row):
+    rows = read_rows(find_run(PLAIN.sub("", list(row.values())[-1]).split("/")[-1]) / "metrics.csv")
+    steps = np.array([int(r["env_steps"]) for r in rows])
+    for title, said in row.items():
+        if title.endswith(" M") and said:
+            nearest = rows[np.abs(steps - 1e6 * float(title[:-2])).argmin()]
+            expected = [float(nearest["train_types_success"]), float(nearest["left_out_success"])]
+            numbers = [float(number) for number in re.findall(r"[\d.]+", said)]
+            assert numbers == pytest.approx(expected[: len(numbers)], abs=0.0501), title
