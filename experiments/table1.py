@@ -6,9 +6,9 @@ import runpy
 from hcp_jax.config import Config
 
 NAMES = (
-    "reacher_hcpe_leave_h",
+    "reacher_aligned_leave_h",
     "reacher_ddpg_leave_h",
-    "reacher_hcpe_leave_e",
+    "reacher_aligned_leave_e",
     "reacher_ddpg_leave_e",
     "peg_film_leave_h",
     "peg_ddpg_leave_h",

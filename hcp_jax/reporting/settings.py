@@ -43,8 +43,8 @@ class Setting:
 
     @property
     def experiment_names(self) -> tuple[str, str]:
-        """The files in `experiments/` that train HCP-E, on the peg with Jacobians, aligned joints and FiLM, and DDPG+HER."""
-        hcpe = "hcpe" if self.prefix == "reacher" else "film"
+        """The files in `experiments/` that train HCP-E, with aligned joints, on the peg with Jacobians and FiLM, and DDPG+HER."""
+        hcpe = "aligned" if self.prefix == "reacher" else "film"
         return f"{self.prefix}_{hcpe}_leave_{self.left_out.lower()}", f"{self.prefix}_ddpg_leave_{self.left_out.lower()}"
 
     def trains(self, name: str) -> bool:
