@@ -43,7 +43,7 @@ class Setting:
 
     @property
     def experiment_names(self) -> tuple[str, str]:
-        """The files in `experiments/` that train HCP-E, with aligned joints, on the peg with Jacobians and FiLM, and DDPG+HER."""
+        """The files in `experiments/` of HCP-E, with aligned joints, on the peg with Jacobians and FiLM, and of DDPG+HER."""
         hcpe = "aligned" if self.prefix == "reacher" else "film"
         return f"{self.prefix}_{hcpe}_leave_{self.left_out.lower()}", f"{self.prefix}_ddpg_leave_{self.left_out.lower()}"
 
