@@ -190,10 +190,9 @@ def film_peg(name: str, **changes) -> Config:
     return aligned_peg(name, ddpg=dataclasses.replace(FAST_PEG_DDPG, network="film", actor_average=0.985), **changes)
 
 
-def scratch_peg(name: str, robot_type: str, network: str = "flat", **changes) -> Config:
+def scratch_peg(name: str, robot_type: str, network: str = "flat", ddpg: DDPGConfig = FAST_PEG_DDPG, **changes) -> Config:
     """Peg insertion into a random hole with arms of one type alone, from the start. `changes` are those of `arm`."""
-    ddpg = dataclasses.replace(FAST_PEG_DDPG, network=network)
-    schedule = {"total_env_steps": 3_840_000, "eval_every": 128_000, "ddpg": ddpg}
+    schedule = {"total_env_steps": 3_840_000, "eval_every": 128_000, "ddpg": dataclasses.replace(ddpg, network=network)}
     return aligned_peg(name, **({"random_hole": RANDOM_HOLE, "pool": only(robot_type)} | schedule | changes))
 
 
@@ -201,10 +200,9 @@ def finetune_peg(name: str, robot_type: str, init: str, network: str = "flat") -
     """`scratch_peg` from the policy in folder `init`: a third of its steps, smaller updates, five-step returns throughout."""
     ddpg = dataclasses.replace(
         FAST_PEG_DDPG,
-        network=network,
         actor_learning_rate=1e-4,
         critic_learning_rate=3e-4,
         warmup_episodes=0,
         n_step_from=0.0,  # it need not be tempted to try: it knows where to go
     )
-    return scratch_peg(name, robot_type, total_env_steps=1_280_000, init=init, init_layers="all", ddpg=ddpg)
+    return scratch_peg(name, robot_type, network, ddpg, total_env_steps=1_280_000, init=init, init_layers="all")
