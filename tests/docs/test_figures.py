@@ -7,11 +7,11 @@ import re
 import numpy as np
 import pytest
 
+from hcp_jax.reporting.settings import ROMAN
 from hcp_jax.training.metrics import read_rows
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "results"
-ROMAN = ("I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX", "X", "XI", "XII", "XIII", "XIV", "XV", "XVI")
 PLAIN = re.compile(r"[`*]")
 
 
@@ -69,16 +69,20 @@ def test_a_row_of_table_1_is_two_rows_of_its_file(row):
     assert row["minutes"] == ", ".join(minutes)
 
 
-@pytest.mark.parametrize("row", find_tables("docs/results.md", "run", "masked", "H, zero-shot")[0], ids=lambda row: row["run"])
+BY_TYPE = find_tables("docs/results.md", "run", "masked", "H, zero-shot")[0]
+OURS = [row for row in BY_TYPE if not row["run"].startswith("the paper's")]
+
+
+@pytest.mark.parametrize("row", OURS, ids=lambda row: row["run"])
 def test_success_by_type_is_that_of_the_evaluations(row):
-    if row["run"].startswith("the paper's"):
-        return
     seeds = read_evaluations(re.search(r"`(\w+)`", row["run"])[1])
     assert len(seeds) == (3 if "3 seeds" in row["run"] else 1)
     for title, said in row.items():
         if title.split(",")[0] in "ABCDEFGHI":
-            mean = np.mean([types[title.split(",")[0]]["success_mean"] for types in seeds])
-            assert abs(float(said.split(" ±")[0]) - mean) < 0.0501, title
+            outcomes = [types[title.split(",")[0]] for types in seeds]
+            mean, std = (np.mean([outcome[name] for outcome in outcomes]) for name in ("success_mean", "success_std"))
+            numbers = [float(number) for number in said.split(" ± ")]
+            assert numbers == pytest.approx([mean, std][: len(numbers)], abs=0.0501), title
 
 
 @pytest.mark.parametrize("row", find_tables("README.md", "experiment", "held out")[0], ids=lambda row: row["experiment"])
@@ -117,3 +121,21 @@ def test_learning_curves_are_those_of_the_runs(row):
             expected = [float(nearest["train_types_success"]), float(nearest["left_out_success"])]
             numbers = [float(number) for number in re.findall(r"[\d.]+", said)]
             assert numbers == pytest.approx(expected[: len(numbers)], abs=0.0501), title
+
+
+ENDS = [row for row in NAMED if row.get("E or H") or row.get("zero-shot")]
+
+
+@pytest.mark.parametrize("row", ENDS, ids=lambda row: PLAIN.sub("", list(row.values())[-1]))
+def test_zero_shot_success_beside_a_curve_is_that_of_the_evaluation(row):
+    name = PLAIN.sub("", list(row.values())[-1])
+    found = [types for part in (name, f"{name}_jk") for types in read_evaluations(part)]
+    if said := row.get("E or H"):
+        (letter,) = [letter for letter in ("E", "H") if letter in found[0] and found[0][letter]["zero_shot"]]
+        numbers = [(letter, said)]
+    else:
+        numbers = re.findall(r"([A-K]) ([\d.]+)", row["zero-shot"])
+    assert numbers
+    for letter, number in numbers:
+        (mean,) = [types[letter]["success_mean"] for types in found if letter in types]
+        assert abs(float(number) - mean) < 0.0501, letter
