@@ -111,6 +111,9 @@ def enable_compilation_cache() -> None:
     if not jax.config.jax_compilation_cache_dir:
         cache = pathlib.Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser()
         jax.config.update("jax_compilation_cache_dir", str(cache / "hcp_jax" / "xla"))
+        # Most programs compile in less than JAX's threshold of a second, and a start has hundreds of them. Programs that call
+        # back to the native engine are never kept.
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 
 
 def load_config(path: str, overrides: Sequence[str] = ()) -> Config:
