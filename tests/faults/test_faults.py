@@ -195,7 +195,7 @@ def test_nan_from_the_physics_of_one_robot_ends_its_episodes_and_nothing_else(ki
     engine._host_step = broken_step
     folder = tmp_path / "run"
     folder.mkdir()
-    loop._run(run, run.init_state(), folder, resume=False)
+    loop._run(run, run.init_state(), folder, resume=False, interrupt=loop.Interrupt())
     last = read_rows(folder / "metrics.csv")[-1]
     assert int(last["diverged_robots"]) == 1
     assert int(last["diverged_episodes"]) > 0
