@@ -288,6 +288,7 @@ class DDPG:
         return action
 
     def _values(self, critic: Any, inputs: jax.Array, action: jax.Array) -> jax.Array:
-        """Action values of each critic: [C, B]."""
-        apply: Any = self.critic.apply
-        return jax.vmap(apply, in_axes=(0, None, None))(critic, inputs, action)
+        """Action values of each critic: [C, B]. One after the other: vmap over a single critic copies its kernels on a CPU."""
+        rows = range(len(jax.tree.leaves(critic)[0]))
+        each = [jax.tree.map(lambda leaf, row=row: leaf[row], critic) for row in rows]
+        return jnp.stack([jnp.asarray(self.critic.apply(params, inputs, action)) for params in each])

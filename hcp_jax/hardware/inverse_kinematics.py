@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
+from hcp_jax.hardware.kinematics import exact_einsum, joint_poses, quat_to_matrix
 from hcp_jax.hardware.pool import RobotPool
 
 NUM_STARTS, NUM_FIRST_STARTS, NUM_STEPS = 24, 4, 60
@@ -90,8 +90,8 @@ def _solve_arm(chain_pos, chain_rotation, low, high, mask, goal, starts, *, upri
 
     def step(angles, _):
         error, jacobian = residual(angles), jax.jacfwd(residual)(angles)
-        normal = jacobian.T @ jacobian + _DAMPING * jnp.eye(angles.shape[0])
-        return jnp.clip(angles - jnp.linalg.solve(normal, jacobian.T @ error), low, high), None
+        normal = exact_einsum("ij,ik->jk", jacobian, jacobian) + _DAMPING * jnp.eye(angles.shape[0])
+        return jnp.clip(angles - jnp.linalg.solve(normal, exact_einsum("ij,i->j", jacobian, error)), low, high), None
 
     def solve(start):
         angles = jax.lax.scan(step, start, None, length=NUM_STEPS)[0]

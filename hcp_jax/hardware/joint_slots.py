@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hcp_jax.hardware.arm import JOINTS, REMOVED_JOINTS, type_name
+from hcp_jax.hardware.kinematics import exact_einsum
 from hcp_jax.hardware.pool import RobotPool
 
 LAYOUTS = ("packed", "aligned")
@@ -47,4 +48,4 @@ def aligned_slots(robot_type: str) -> np.ndarray:
 def _reorder(matrices: jax.Array, values: jax.Array) -> jax.Array:
     """Exact: each row has a single 1. (A gather has no translation to ONNX.)"""
     rows = values[..., None] if values.ndim < matrices.ndim else values
-    return jnp.einsum("...ij,...jk->...ik", matrices, rows, precision=jax.lax.Precision.HIGHEST).reshape(values.shape)
+    return exact_einsum("...ij,...jk->...ik", matrices, rows).reshape(values.shape)

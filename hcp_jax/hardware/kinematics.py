@@ -1,8 +1,15 @@
-"""Forward kinematics of padded chains, differentiable, for any batch of different arms."""
+"""Forward kinematics of padded chains, differentiable, for any batch of different arms.
+
+Products are of full float32. By default a GPU rounds factors to 10 bits (TF32): half a millimetre in a metre with each.
+"""
+
+import functools
 
 import chex
 import jax
 import jax.numpy as jnp
+
+exact_einsum = functools.partial(jnp.einsum, precision=jax.lax.Precision.HIGHEST)
 
 
 def quat_to_matrix(quat: jax.Array) -> jax.Array:
@@ -49,10 +56,10 @@ def joint_poses(chain_pos: jax.Array, chain_rotation: jax.Array, angles: jax.Arr
     rotation = jnp.broadcast_to(jnp.eye(3), (*angles.shape[:-1], 3, 3))
     positions, rotations = [], []
     for i in range(chain_pos.shape[-2]):
-        position = position + jnp.einsum("...ij,...j->...i", rotation, chain_pos[..., i, :])
-        rotation = rotation @ chain_rotation[..., i, :, :]
+        position = position + exact_einsum("...ij,...j->...i", rotation, chain_pos[..., i, :])
+        rotation = exact_einsum("...ij,...jk->...ik", rotation, chain_rotation[..., i, :, :])
         if i < angles.shape[-1]:
-            rotation = rotation @ turn[..., i, :, :]
+            rotation = exact_einsum("...ij,...jk->...ik", rotation, turn[..., i, :, :])
         positions.append(position)
         rotations.append(rotation)
     return jnp.stack(positions, axis=-2), jnp.stack(rotations, axis=-3)

@@ -22,7 +22,7 @@ import numpy as np
 
 from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS, encode_arms
 from hcp_jax.hardware.joint_slots import JointSlots
-from hcp_jax.hardware.kinematics import joint_poses, quat_to_matrix
+from hcp_jax.hardware.kinematics import exact_einsum, joint_poses, quat_to_matrix
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.random_chain import GRAVITY
 from hcp_jax.policies.conditioning import Embedding
@@ -108,8 +108,8 @@ class GoalConditioning:
         if self.encoding in ("chain_fk+jacobian", MOTOR_LOADS):
             jacobian = jnp.cross(axes, end_effector[..., None, :] - anchors)
             turns = jnp.cross(axes, rotations[..., -1, None, :, 2])
-            robot += [entries(jacobian), entries(turns), jnp.einsum("...ij,...i->...j", jacobian, velocities)]
-            towards += [entries(jnp.einsum("...ij,...j->...i", jacobian, soft_direction(goal - end_effector)))]
+            robot += [entries(jacobian), entries(turns), exact_einsum("...ij,...i->...j", jacobian, velocities)]
+            towards += [entries(exact_einsum("...ij,...j->...i", jacobian, soft_direction(goal - end_effector)))]
         if self.encoding == MOTOR_LOADS:
             dynamics = {name: values[index] for name, values in self._dynamics.items()}
             robot += [entries(load) for load in motor_loads(dynamics, anchors, axes, positions, rotations)]
@@ -134,12 +134,12 @@ def motor_loads(
     mass, limit = dynamics["link_mass"], dynamics["torque_limit"]
     is_missing = limit <= 0
     limit = jnp.where(is_missing, 1.0, limit)
-    com = positions[..., :-1, :] + jnp.einsum("...ij,...j->...i", rotations[..., :-1, :, :], dynamics["link_com"])
+    com = positions[..., :-1, :] + exact_einsum("...ij,...j->...i", rotations[..., :-1, :, :], dynamics["link_com"])
     # How fast the joint on the first axis moves the link on the second: [..., 7, 7, 3]; not those before it.
     motion = jnp.cross(axes[..., :, None, :], com[..., None, :, :] - anchors[..., :, None, :])
     motion = motion * jnp.triu(jnp.ones((mass.shape[-1], mass.shape[-1])))[..., None]
-    hold = GRAVITY * jnp.einsum("...ij,...j->...i", motion[..., 2], mass)
-    inertia = jnp.einsum("...ij,...j->...i", jnp.sum(jnp.square(motion), axis=-1), mass) + dynamics["armature"]
+    hold = GRAVITY * exact_einsum("...ij,...j->...i", motion[..., 2], mass)
+    inertia = exact_einsum("...ij,...j->...i", jnp.sum(jnp.square(motion), axis=-1), mass) + dynamics["armature"]
     agility = jnp.log(limit / jnp.where(is_missing, 1.0, inertia))
     return [jnp.where(is_missing, 0.0, hold / limit), dynamics["damping"] / limit, dynamics["frictionloss"] / limit, agility]
 

@@ -19,7 +19,7 @@ class MLP(nn.Module):
     @nn.compact
     def __call__(self, x: jax.Array) -> jax.Array:
         for i, size in enumerate(self.hidden_sizes):
-            x = nn.selu(nn.Dense(size, name=f"hidden_{i}")(x))
+            x = selu(nn.Dense(size, name=f"hidden_{i}")(x))
         init = nn.initializers.variance_scaling(self.output_scale**2, "fan_in", "truncated_normal")
         return nn.Dense(self.output_size, kernel_init=init, name="output")(x)
 
@@ -61,6 +61,7 @@ class ActorCritic(nn.Module):
         return self.act(obs, v_h), self.value(obs, v_h), predicted
 
 
+SELU_ALPHA, SELU_SCALE = 1.6732632423543772, 1.0507009873554805
 FILM_SIZE = 64  # numbers in which a network with FiLM sums up v_h
 
 
@@ -105,6 +106,12 @@ class Critic(nn.Module):
         return nn.Dense(1, kernel_init=init, name="output")(x)[..., 0]
 
 
+def selu(x: jax.Array) -> jax.Array:
+    """SELU (Klambauer et al. 2017): [...]. By exp, not expm1 as `nn.selu`, which takes twice as long on a CPU and is more exact
+    than networks need."""
+    return SELU_SCALE * jnp.where(x > 0, x, SELU_ALPHA * (jnp.exp(jnp.where(x > 0, 0.0, x)) - 1.0))
+
+
 def selu_layer(x: jax.Array, size: int, name: str, layer_norm: bool, summary: jax.Array | None = None) -> jax.Array:
     """A dense layer with SELU. Call inside a compact module.
 
@@ -118,7 +125,7 @@ def selu_layer(x: jax.Array, size: int, name: str, layer_norm: bool, summary: ja
         film = nn.Dense(2 * size, kernel_init=nn.initializers.zeros, name=f"{name}_film")(summary)
         scale, shift = jnp.split(film, 2, axis=-1)
         x = x * (1.0 + scale) + shift
-    return nn.selu(x)
+    return selu(x)
 
 
 def summarize_v_h(inputs: jax.Array, film_from: int | None, layer_norm: bool) -> jax.Array | None:

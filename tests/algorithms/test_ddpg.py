@@ -52,8 +52,9 @@ def trained(learner: DDPG, num_iterations: int = 40, seed: int = 0) -> DDPGState
 
 def test_a_sparse_goal_is_learned_with_hindsight_and_not_without():
     with_hindsight, without = (make(relabel=relabel) for relabel in ("future", "none"))
-    assert success_rate(with_hindsight, trained(with_hindsight)) > 0.9
-    assert success_rate(without, trained(without)) < 0.7
+    # After 20 iterations; after 40 a seed in three finds the goal by chance.
+    assert success_rate(with_hindsight, trained(with_hindsight, 20)) > 0.9
+    assert success_rate(without, trained(without, 20)) < 0.5
 
 
 def test_learning_rates_have_fallen_to_their_decay_at_the_end_of_the_run():

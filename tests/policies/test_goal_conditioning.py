@@ -38,10 +38,15 @@ def make(arms: RobotPool, encoding: str) -> GoalConditioning:
     return GoalConditioning(arms, encoding, arms, observation_size=14, goal_size=3, embedding=embedding)
 
 
+def at_rest(angles: np.ndarray) -> jax.Array:
+    """Observations [2, 14] of both arms."""
+    return jnp.concatenate([jnp.asarray(angles, jnp.float32), jnp.zeros((2, 7))], axis=1)
+
+
 def features(arms: RobotPool, encoding: str, angles: np.ndarray) -> np.ndarray:
     """What each encoding adds to the observation and the goal, for both arms: [2, size]."""
     conditioning = make(arms, encoding)
-    obs = jnp.concatenate([jnp.asarray(angles, jnp.float32), jnp.zeros((2, 7))], axis=1)
+    obs = at_rest(angles)
     inputs = conditioning.inputs(conditioning.init(jax.random.key(0)), jnp.arange(2), obs, GOAL)
     np.testing.assert_array_equal(inputs[:, :17], jnp.concatenate([obs, GOAL], axis=1))
     assert inputs.shape == (2, conditioning.size)
@@ -66,6 +71,13 @@ def end_effectors(arms: RobotPool, angles: np.ndarray) -> np.ndarray:
 
 def test_every_encoding_is_as_long_as_documented(arms, angles):
     assert {name: features(arms, name, angles).shape[1] for name in ARM_CONDITIONINGS} == LENGTHS
+
+
+@pytest.mark.parametrize("encoding", ["chain_fk", "chain_fk+jacobian+dynamics"])
+def test_no_product_of_geometry_is_left_to_a_gpus_rounding(encoding, arms, angles):
+    conditioning = make(arms, encoding)
+    text = str(jax.make_jaxpr(lambda obs: conditioning.inputs(None, jnp.arange(2), obs, GOAL))(at_rest(angles)))
+    assert text.count("dot_general[") == text.count("precision=(Precision.HIGHEST, Precision.HIGHEST)") > 7
 
 
 def test_the_controls_see_the_end_effector_and_nothing_else_of_the_robot(arms, angles):
