@@ -16,8 +16,7 @@ from hcp_jax.reporting.tables import NOT_RUN, capitalise, decimals, difference, 
 
 DISTANCE = "final distance [m]"
 SUCCESS_DISTANCE = (0.02, "success: 0.02 m")
-# Trained at damping 0.01 to 2: the paper's, and HCP-E.
-STRESSED = ("peg_low_damping_ddpg", "peg_low_damping_jacobian", "peg_low_damping_film")
+STRESSED = ("peg_low_damping_ddpg", "peg_low_damping_film")  # trained at damping 0.01 to 2; the paper's and HCP-E
 VIOLINS = "Violins with lowest value, median and highest value."
 BOXES = (
     "Boxes, where a record holds quantiles alone: 25 to 75 %, median, whiskers from the lowest value to 95 %, ring: highest."
