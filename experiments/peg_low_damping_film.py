@@ -1,4 +1,4 @@
-"""Stress test (paper, "How robust"): peg insertion, type I, trained at damping 0.01 to 2; HCP-E, Jacobians, FiLM. Preset: fast."""
+"""Stress test (paper, "How robust"): peg insertion, type I, trained at damping 0.01 to 2; HCP-E, FiLM. Preset: fast."""
 
 import dataclasses
 
