@@ -58,7 +58,7 @@ def test_the_asked_share_of_episodes_starts_with_the_peg_upright_above_its_hole(
     state = env.reset(key, jnp.tile(jnp.arange(3), 200))
     lift = np.asarray(state.achieved_goal - state.desired_goal)
     started_near = np.linalg.norm(lift[:, :2], axis=1) < 0.006
-    # Which pose above the hole is found first, and so how many of the others, hangs on rounding.
+    # How many poses are found hangs on the one above the hole that the others are searched from.
     has_pose = np.any(env.pool.hardware["approach_angles"], axis=-1).mean()
     assert has_pose > 0.5
     assert abs(started_near.mean() - 0.25 * has_pose) < 0.05
