@@ -80,6 +80,15 @@ class DDPGState:
     skipped: Skipped
     sums: dict[str, jax.Array]
 
+    def published(self) -> dict[str, Any]:
+        """What a published policy holds: one actor, the mean."""
+        params = self.params | {"actor": self.average_actor}
+        return {"iteration": self.iteration, "params": params, "statistics": self.statistics}
+
+    def with_published(self, content: dict[str, Any]) -> "DDPGState":
+        """This state with what `published` gave; its last actor is the mean too."""
+        return self.replace(**content, average_actor=content["params"]["actor"])
+
 
 MIN_STD = 3e-4  # above what single precision makes of an input that is the same in every step, [m] or [rad]
 LOSS_METRICS = ("critic_loss", "actor_loss", "q")

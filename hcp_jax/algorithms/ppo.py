@@ -93,6 +93,14 @@ class PPOState:
     skipped: Skipped
     sums: dict[str, jax.Array]
 
+    def published(self) -> dict[str, Any]:
+        """What a published policy holds."""
+        return {name: getattr(self, name) for name in self.policy_fields}
+
+    def with_published(self, content: dict[str, Any]) -> "PPOState":
+        """This state with what `published` gave."""
+        return self.replace(**content)
+
 
 @struct.dataclass
 class Actor:

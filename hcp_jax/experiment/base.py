@@ -13,8 +13,9 @@ TRAIN, FIT = 0, 1
 EVALUATION_SEED = 20180101
 
 
-# A learner's state: a flax record with iteration, params, diverged [N], overflow [], sums (metrics by name), and policy_fields,
-# the names of what a policy without its training needs.
+# A learner's state: a flax record with iteration, params, diverged [N], overflow [], sums (metrics by name); policy_fields, the
+# names of what a policy without its training needs; published(), what of these a published policy holds, by name, and
+# with_published(content), the state with that put in.
 TrainingState = Any
 
 

@@ -18,8 +18,7 @@ from hcp_jax.training.checkpoint import CheckpointError, Checkpoints, check_arch
 
 def write_policy(folder: pathlib.Path, state: TrainingState) -> pathlib.Path:
     """Writes `policy.msgpack`: the kernels of networks as float16, the rest as float32. Returns its path."""
-    content = flax.serialization.to_state_dict({name: getattr(state, name) for name in state.policy_fields})
-    content = jax.device_get(content)
+    content = jax.device_get(flax.serialization.to_state_dict(state.published()))
     rounded = jax.tree.map(lambda leaf, half: leaf.astype(np.float16) if half else leaf, content, mark_kernels(content))
     path = folder / run_folder.POLICY_FILE
     path.write_bytes(flax.serialization.msgpack_serialize(rounded))
@@ -30,22 +29,23 @@ def read_policy(folder: pathlib.Path, template: TrainingState) -> TrainingState:
     """`template`, a state of arrays or of their shapes, with the policy put in.
 
     Raises:
-        CheckpointError: the file is damaged, or of another architecture than `template`.
+        CheckpointError: the file is damaged, was written by another version, or is of another architecture than `template`.
     """
-    path = folder / run_folder.POLICY_FILE
+    path, empty = folder / run_folder.POLICY_FILE, template.published()
     try:
-        content = flax.serialization.msgpack_restore(path.read_bytes())
-        fields = {name: content[name] for name in template.policy_fields}
-    except (ValueError, KeyError, TypeError) as error:
+        fields = flax.serialization.msgpack_restore(path.read_bytes())
+    except ValueError as error:
         raise CheckpointError(f"{path}: damaged ({type(error).__name__})") from error
+    if not isinstance(fields, dict) or fields.keys() != empty.keys():
+        held = ", ".join(map(str, fields)) if isinstance(fields, dict) else type(fields).__name__
+        raise CheckpointError(f"{path}: holds {held}, not {', '.join(empty)}: of another version; collect its run anew")
     shapes = {leaf_name(path): np.shape(leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(fields)}
     check_architecture(shapes, template, str(path))
-    empty = {name: getattr(template, name) for name in template.policy_fields}
     try:
         policy = flax.serialization.from_state_dict(empty, jax.tree.map(_widen, fields))
     except ValueError as error:
         raise CheckpointError(f"{path}: another architecture ({one_line(error)})") from error
-    return template.replace(**policy)
+    return template.with_published(policy)
 
 
 def _widen(leaf: np.ndarray | int) -> jax.Array:
