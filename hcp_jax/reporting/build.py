@@ -8,6 +8,7 @@ from hcp_jax.reporting.curves import curve_sections
 from hcp_jax.reporting.distributions import damping_section, distance_section
 from hcp_jax.reporting.hoppers import hopper_section
 from hcp_jax.reporting.page import GENERATOR, Figure, Item, Section, write_page
+from hcp_jax.reporting.pool_sizes import pool_size_section
 from hcp_jax.reporting.published import Published
 from hcp_jax.reporting.rehearsals import rehearsal_section
 from hcp_jax.reporting.robots import describe_arm, draw_arm, draw_hopper
@@ -38,8 +39,8 @@ def build_report(results: pathlib.Path) -> tuple[str, list[str]]:
     table1, types = table_sections(published)
     curves, finetuning, *of_type_i = curve_sections(published)
     distances, damping, hopper = distance_section(published), damping_section(published), hopper_section(published)
-    rehearsal = rehearsal_section(published)
-    sections = (robot_section(), table1, types, curves, distances, rehearsal, finetuning, *of_type_i, damping, hopper)
+    rehearsal, sizes = rehearsal_section(published), pool_size_section(published)
+    sections = (robot_section(), table1, types, curves, distances, sizes, rehearsal, finetuning, *of_type_i, damping, hopper)
     return write_page(TITLE, INTRODUCTION, sections), published.missing
 
 

@@ -3,7 +3,7 @@
 import base64
 import dataclasses
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import matplotlib
 import numpy as np
@@ -28,6 +28,7 @@ COLOURS = {
     "random": "#56B4E9",
     "chain": "#000000",
 }
+_DISTINCT = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")  # of what does not differ in what it sees
 OTHER_COLOUR = "#777777"
 _LINES = ("-", "--", ":", "-.")  # of curves that would have the same colour
 _STYLE = {
@@ -101,6 +102,29 @@ def draw_curves(lines: Sequence[Line], label: str, limits: tuple[float, float] |
         axes.figure.legend(loc="outside lower left", fontsize=8)
 
     return render(draw, (PANEL[0], PANEL[1] + 0.18 * len(lines)))
+
+
+def draw_points(
+    points: Mapping[str, Sequence[tuple[float, float]]], x_label: str, label: str, limits: tuple[float, float]
+) -> str:
+    """Points (x, y) by name over a logarithmic axis, a line through the means of those of equal x."""
+
+    def draw(axes: Axes) -> None:
+        for name, colour in zip(points, _DISTINCT, strict=False):
+            x, y = np.asarray(sorted(points[name])).T
+            places = np.unique(x)
+            axes.plot(places, [np.mean(y[x == place]) for place in places], color=colour, label=name)
+            axes.plot(x, y, "o", color=colour, markersize=4)
+        axes.set_xscale("log")
+        ticks = sorted({x for values in points.values() for x, _ in values})
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.minorticks_off()
+        axes.set_xlabel(x_label)
+        axes.set_ylabel(label)
+        axes.set_ylim(*limits)
+        axes.figure.legend(loc="outside lower left", fontsize=8)
+
+    return render(draw)
 
 
 def draw_spreads(spreads: Sequence[Spread], label: str, mark: tuple[float, str] | None = None) -> str:

@@ -21,6 +21,7 @@ from hcp_jax.evaluation.table1 import PAPER
 from hcp_jax.hardware.arm import arm_spec
 from hcp_jax.hardware.start_poses import start_angles
 from hcp_jax.reporting.curves import train_commands
+from hcp_jax.reporting.pool_sizes import LIST, NAMES
 from hcp_jax.reporting.published import Published
 from hcp_jax.reporting.robots import arm_pose
 from hcp_jax.reporting.settings import LISTED, LISTED_COMMAND, SETTINGS, name_inputs, roman
@@ -226,6 +227,13 @@ def results(tiny_arms, tiny_config, tmp_path_factory) -> pathlib.Path:
     for low, high, success in ((0.01, 2.0, 99.0), (40.0, 50.0, 51.0)):
         record = evaluation("low_s0", {"I": outcome(success, **single)}, ranges={"damping": [low, high]})
         write_json(folder / "arms" / "damping" / f"low_s0_{low:g}_{high:g}.json", record)
+    for number, of_types, left_out in ((40, (80.0, 90.0), 70.0), (10, (30.0, 50.0), 20.0)):
+        pool = dataclasses.replace(tiny_arms.pool, robots_per_type=number)
+        config = dataclasses.replace(tiny_arms, name=f"reacher_pool_{number}", total_env_steps=3_000_000, pool=pool)
+        write_run(folder / "arms" / "runs" / f"{config.name}_s0", config, [{"env_steps": 80, "train_types_success": 1.0}])
+        types = {name: outcome(mean, zero_shot=False) for name, mean in zip("AB", of_types, strict=True)}
+        record = evaluation(f"{config.name}_s0", types | {"H": outcome(left_out)})
+        write_json(folder / "arms" / "pool_sizes" / f"{config.name}_s0.json", record)
     for encoding in ("none", "kinematics"):
         hopper = dataclasses.replace(tiny_config, name=f"hopper_{encoding}", encoding=encoding)
         rows = [{"env_steps": n, "train_return_mean": 2.0 * n, "heldout_return_mean": 1.0 * n} for n in (64, 128)]
@@ -268,6 +276,18 @@ def test_the_rehearsed_sawyer_stands_beside_the_papers_real_one(tiny):
     assert (a["median distance, real [m]"], c["median distance, real [m]"]) == ("0.155", "0.015")
     assert (c["real"], c["paper, real arm"], c["difference"]) == ("50.00", "", "")
     assert "Violins" in tiny.pictures["rehearsal"][0]
+
+
+def test_success_stands_beside_the_number_of_training_robots_that_it_was_reached_with(tiny):
+    few, more = tiny.rows("pool_sizes", "Success on new arms")
+    assert list(few.values()) == ["10", "40.00", "20.00 \N{PLUS-MINUS SIGN} 1.00", "0", "3.00", "reacher_pool_10_s0"]
+    assert (more["arms of each type"], more["types trained on [%]"], more["type left out [%]"][:5]) == ("40", "85.00", "70.00")
+    assert len(tiny.pictures["pool_sizes"]) == 2
+
+
+def test_the_pool_sizes_of_the_page_are_those_of_the_sweep():
+    configs = runpy.run_path(str(ROOT / LIST))["get_configs"]()
+    assert tuple(config.name for config in configs) == NAMES
 
 
 def test_what_first_steps_tell_is_averaged_over_seeds(tiny):
@@ -353,6 +373,16 @@ DAMAGED = {
         "rehearsal/reacher_sawyer_s0_sawyer.json",
         json.dumps({"run": "a", "robot": "b", "encoding": "none", "conditions": {}}),
         "no field 'real'",
+    ),
+    "pool sizes without a run": (
+        "arms/pool_sizes/reacher_pool_10_s0.json",
+        json.dumps(evaluation("gone_s0", {"H": outcome(1.0)})),
+        "no run of its policy gone_s0",
+    ),
+    "pool sizes without a type left out": (
+        "arms/pool_sizes/reacher_pool_10_s0.json",
+        json.dumps(evaluation("reacher_pool_10_s0", {"A": outcome(1.0, zero_shot=False)})),
+        "no type that was left out",
     ),
     "summary": ("hopper/summary.json", '[{"algorithm": "PPO"}]', "no field"),
     "finetune": ("hopper/finetune.json", '[{"run": "a"}]', "no field"),

@@ -1,0 +1,73 @@
+"""What more training robots bring to robots never seen, which the paper does not show."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hcp_jax.config import ArmPoolConfig, Config
+from hcp_jax.evaluation.records import Evaluation, naming, read_evaluation
+from hcp_jax.reporting.curves import LABEL, LIMITS, make_curves
+from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
+from hcp_jax.reporting.plots import draw_points
+from hcp_jax.reporting.published import Published
+from hcp_jax.reporting.settings import RESULTS_COMMANDS
+from hcp_jax.reporting.tables import decimals, spread
+
+LIST = "experiments/pool_sizes.py"
+NAMES = tuple(f"reacher_pool_{number}" for number in (10, 40, 140, 560, 1440))
+COMMANDS = (
+    f"python -m hcp_jax.sweep {LIST} --out runs/arms",
+    RESULTS_COMMANDS[1],
+    "python -m hcp_jax.evaluate results/policies/POLICY --without-robots --json results/arms/pool_sizes/POLICY.json",
+)
+
+
+def pool_size_section(published: Published) -> Section:
+    """Success on new arms of the types trained on, and on the type left out, by the number of arms of each type trained on."""
+    curves = make_curves(published, "Their training", NAMES, COMMANDS[:2])
+    return Section(
+        "pool_sizes",
+        "Success against the number of training robots",
+        (make_sizes(published), curves),
+        "Exp. I, HCP-E on the reacher, with more and fewer arms of each of the eight types, at equal control steps. The paper "
+        "trains on 140. With 1440 there are about as many arms as the training has episodes.",
+    )
+
+
+def make_sizes(published: Published) -> Item:
+    """A row for each policy, and a line for each kind of arms."""
+    found = sorted(read_sizes(published), key=lambda item: (item[0], item[1].policy))
+    if not found:
+        return Item("New arms", commands=COMMANDS)
+    files = tuple(published.show(evaluation.path) for _, evaluation, _ in found)
+    rows, points = [], {"new arms of the types trained on": [], "the type left out": []}
+    for number, evaluation, config in found:
+        trained = float(np.mean([each.success_mean for each in evaluation.types.values() if not each.zero_shot]))
+        left_out = [each for each in evaluation.types.values() if each.zero_shot]
+        shown = spread(left_out[0].success_mean, left_out[0].success_std)
+        steps = f"{config.total_env_steps / 1e6:.2f}"
+        rows.append(Row((str(number), decimals(trained), shown, str(config.seed), steps, evaluation.policy)))
+        for values, success in zip(points.values(), (trained, left_out[0].success_mean), strict=True):
+            values.append((number, success))
+    columns = ("arms of each type", "types trained on [%]", "type left out [%]", "seed", "control steps [M]", "policy")
+    table = Table("Success on new arms", columns, "rrrrrc", tuple(rows), files)
+    figure = Figure(draw_points(points, "training arms of each type", LABEL, LIMITS), "New arms, 1000 of each type.", files)
+    return Item("New arms", "", (table,), (figure,), COMMANDS)
+
+
+def read_sizes(published: Published) -> Sequence[tuple[int, Evaluation, Config]]:
+    """The records in `arms/pool_sizes`, each with its policy's number of training arms of each type and its config.
+
+    Raises RecordError if one's run is not published, or it has no type that was left out."""
+    folder = published.find("arms/pool_sizes")
+    configs, found = {run.folder.name: run.config for run in published.arms}, []
+    for path in sorted(folder.glob("*.json")) if folder else ():
+        evaluation = read_evaluation(path)
+        with naming(path):
+            config = configs.get(evaluation.policy)
+            if config is None or not isinstance(config.pool, ArmPoolConfig):
+                raise ValueError(f"no run of its policy {evaluation.policy} is published")
+            if not any(outcome.zero_shot for outcome in evaluation.types.values()):
+                raise ValueError("it has no type that was left out")
+            found.append((config.pool.robots_per_type, evaluation, config))
+    return found
