@@ -13,7 +13,7 @@ from hcp_jax.benchmarks.physics import ROWS, benchmark_physics
 from hcp_jax.benchmarks.scale import benchmark_scale
 from hcp_jax.benchmarks.training import TRAINING_ROWS, benchmark_training, time_to_success
 from hcp_jax.config import Config, ConfigError
-from hcp_jax.evaluation.statistics import write_json
+from hcp_jax.evaluation.files import write_json
 from hcp_jax.training.run_folder import describe_environment
 
 SUBJECTS = ("physics", "learner", "train", "scale")

@@ -9,7 +9,7 @@ from rich.table import Table
 from hcp_jax import command_line
 from hcp_jax.config import ConfigError
 from hcp_jax.evaluation.catalogue_table import make_catalogue_table
-from hcp_jax.evaluation.statistics import write_json
+from hcp_jax.evaluation.files import write_json
 from hcp_jax.hardware.catalogue import catalogue_names
 
 

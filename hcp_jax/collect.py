@@ -16,7 +16,9 @@ from hcp_jax.training.run_folder import read_config
 def main(arguments: list[str] | None = None) -> None:
     parser = command_line.OneLineParser(prog="hcp_jax.collect", description="Adds run folders to the results.")
     parser.add_argument("runs", type=pathlib.Path, nargs="?", help="folder of run folders; without it nothing is added")
-    parser.add_argument("--out", type=pathlib.Path, required=True, help="folder of results, whose tables are made anew")
+    parser.add_argument(
+        "--out", type=command_line.output_folder, required=True, help="folder of results, whose tables are made anew"
+    )
     options = parser.parse_args(arguments)
     with command_line.user_errors_end_the_command():
         added = find_runs(options.runs) if options.runs else []

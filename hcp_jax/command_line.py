@@ -63,6 +63,14 @@ def new_output(word: str) -> pathlib.Path:
     return path
 
 
+def output_folder(word: str) -> pathlib.Path:
+    """A path on the command line of a folder that will be written into, and made if it is missing."""
+    path = new_output(word)
+    if path.exists() and not path.is_dir():
+        raise argparse.ArgumentTypeError(f"{word}: exists and is no folder")
+    return path
+
+
 def output_file(*suffixes: str) -> Callable[[str], pathlib.Path]:
     """Reads a path on the command line that a file will be written to; over an older one if that ends in one of `suffixes`."""
 

@@ -8,9 +8,9 @@ from rich.table import Table
 from hcp_jax import command_line
 from hcp_jax.config import Config, ConfigError
 from hcp_jax.evaluation.arm_sweeps import evaluate_arms
+from hcp_jax.evaluation.files import write_json
 from hcp_jax.evaluation.hopper_sweeps import evaluate_hoppers
 from hcp_jax.evaluation.new_robots import RangeChange, check_types
-from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.hardware.catalogue import load_robot
 from hcp_jax.training.run_folder import read_config
 
@@ -82,6 +82,8 @@ def check_options(options: argparse.Namespace, config: Config) -> None:
     for name in ("first_steps", "fit_steps"):
         if getattr(options, name) and config.task != "hopper":
             raise ConfigError(f"--{name.replace('_', '-')}: goes with a policy of hoppers")
+    if options.fit_steps and config.encoding != "embedding":
+        raise ConfigError(f"--fit-steps: goes with a learned v_h (encoding embedding), and this policy's is {config.encoding}")
     if (options.base or options.tip) and options.robot is None:
         raise ConfigError("--base, --tip: go with --robot")
     if options.robot is not None and (config.task == "hopper" or options.types or options.pool or options.range):

@@ -7,7 +7,6 @@ from typing import Any
 from hcp_jax.config import Config, to_dict
 from hcp_jax.errors import UserError, one_line
 
-LOCAL = "local"
 MAX_RETRIES = 3
 
 Job = tuple[Config, pathlib.Path]
@@ -34,7 +33,7 @@ def run_on_ray(jobs: Sequence[Job], run: Run, address: str, cpus_per_run: int) -
         import ray
     except ImportError as error:
         raise UserError("--ray: needs the extra ray: pip install ray") from error
-    ray.init(address=None if address == LOCAL else address, include_dashboard=False, log_to_driver=True)
+    ray.init(address=address, include_dashboard=False, log_to_driver=True)
     try:
         # Only a worker's death is tried again: bad input stays bad.
         remote = ray.remote(num_cpus=cpus_per_run, max_retries=MAX_RETRIES)(run)

@@ -6,8 +6,8 @@ from rich.table import Table
 
 from hcp_jax import command_line
 from hcp_jax.config import ConfigError
+from hcp_jax.evaluation.files import write_json
 from hcp_jax.evaluation.rehearsal import rehearse
-from hcp_jax.evaluation.statistics import write_json
 
 
 def main(arguments: list[str] | None = None) -> None:

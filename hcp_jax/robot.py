@@ -9,7 +9,7 @@ from rich.table import Table
 
 from hcp_jax import command_line, presets
 from hcp_jax.config import ArmPoolConfig, ConfigError
-from hcp_jax.evaluation.statistics import write_json
+from hcp_jax.evaluation.files import write_json
 from hcp_jax.experiment.arm import make_train_arms
 from hcp_jax.hardware.arm_encodings import encode_arms
 from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES

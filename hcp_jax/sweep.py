@@ -1,6 +1,5 @@
 """`python -m hcp_jax.sweep experiments/LIST.py --seeds 3 [--out runs/LIST] [--ray ADDRESS] [--config.FIELD=VALUE ...]`"""
 
-import argparse
 import dataclasses
 import functools
 import pathlib
@@ -9,7 +8,7 @@ import sys
 from hcp_jax import command_line
 from hcp_jax.config import Config, ConfigError, from_dict
 from hcp_jax.errors import NonFiniteError, PhysicsOverflowError, one_line
-from hcp_jax.evaluation.statistics import write_json
+from hcp_jax.evaluation.files import write_json
 from hcp_jax.evaluation.summary import summarise_runs
 from hcp_jax.ray_sweep import Job, run_on_ray
 from hcp_jax.training import loop, run_folder
@@ -20,20 +19,24 @@ def main(arguments: list[str] | None = None) -> None:
     parser = command_line.OneLineParser(
         prog="hcp_jax.sweep",
         description="Runs a list of experiments with several seeds: skips what is done, resumes what was cut off.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     parser.add_argument("list", help="Python file whose get_configs() gives the experiments; it will be executed")
-    parser.add_argument("--seeds", type=int, default=1, help="seeds 0 to SEEDS-1 of each experiment")
-    parser.add_argument("--out", type=pathlib.Path, help="folder of run folders (default: runs/LIST)")
+    parser.add_argument("--seeds", type=int, default=1, help="seeds 0 to SEEDS-1 of each experiment (default: 1)")
+    parser.add_argument("--out", type=command_line.output_folder, help="folder of run folders (default: runs/LIST)")
     parser.add_argument(
         "--summary", type=command_line.output_file(".json"), help="JSON file for the table (default: OUT/summary.json)"
     )
     parser.add_argument("--ray", metavar="ADDRESS", help="run on this Ray cluster; `local`: on one of this machine's cores")
-    parser.add_argument("--cpus-per-run", type=int, default=1, help="with --ray: cores that each run reserves")
+    parser.add_argument("--cpus-per-run", type=int, help="with --ray: cores that each run reserves (default: 1)")
     known, overrides = parser.parse_known_args(arguments)
     with command_line.user_errors_end_the_command():
         if known.seeds < 1:
             raise ConfigError(f"--seeds={known.seeds}: expected at least 1")
+        if known.cpus_per_run is not None and known.ray is None:
+            raise ConfigError("--cpus-per-run: goes with --ray")
+        cpus = 1 if known.cpus_per_run is None else known.cpus_per_run
+        if cpus < 1:
+            raise ConfigError(f"--cpus-per-run={cpus}: expected at least 1")
         if any(word.startswith("--config.seed") for word in overrides):
             raise ConfigError("--config.seed: a sweep has seeds 0 to SEEDS-1; expected --seeds")
         configs = [command_line.apply_overrides(config, overrides) for config in command_line.load_configs(known.list)]
@@ -45,7 +48,7 @@ def main(arguments: list[str] | None = None) -> None:
             for config in configs
         ]
         check_jobs(jobs)
-        run_all = run_here if known.ray is None else functools.partial(run_there, address=known.ray, cpus=known.cpus_per_run)
+        run_all = run_here if known.ray is None else functools.partial(run_there, address=known.ray, cpus=cpus)
         if run_all(jobs):
             write_json(known.summary or out / "summary.json", summarise_runs([folder for _, folder in jobs]))
 

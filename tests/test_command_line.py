@@ -66,6 +66,11 @@ BAD_ARGUMENTS = {
     "reversed range": (["--config", HOPPER, "--config.pool.ranges.armature=(2.0,1.0)"], "low is above high"),
     "unknown encoding": (["--config", HOPPER, "--config.encoding=colour"], "encoding='colour': expected one of none"),
     "unknown physics": (["--config", HOPPER, "--config.physics=bullet"], "physics='bullet': expected one of auto"),
+    "a negative seed of the pool": (
+        ["--config", HOPPER, "--config.pool.seed=-1"],
+        "pool.seed=-1: expected 0 to 9223372036854775807",
+    ),
+    "a negative seed of a pool of arms": (["--config", REACHER, "--config.pool.seed=-1"], "pool.seed=-1: expected 0 to"),
     "no robots": (["--config", HOPPER, "--config.pool.num_robots=0"], "pool.num_robots=0: expected at least 1"),
     "unknown robot type": (
         ["--config", REACHER, "--config.pool.types=('A','Q')"],
@@ -215,7 +220,13 @@ def test_a_sweep_refuses_no_seeds_and_a_folder_of_another_setting(finished_run, 
     path.write_text(path.read_text() + "def get_configs():\n    return [get_config()]\n")
     arguments = [str(path), "--out", str(tmp_path / "runs")]
     assert "list.py: no such file" in fails(capsys, sweep.main, ["list.py"])
-    assert "--seeds=0: expected at least 1" in fails(capsys, sweep.main, [*arguments, "--seeds", "0"])
+    for words, expected in (
+        (("--seeds", "0"), "--seeds=0: expected at least 1"),
+        (("--cpus-per-run", "2"), "--cpus-per-run: goes with --ray"),
+        (("--ray", "local", "--cpus-per-run", "0"), "--cpus-per-run=0: expected at least 1"),
+        (("--out", str(path)), "experiment.py: exists and is no folder"),
+    ):
+        assert expected in fails(capsys, sweep.main, [*arguments, *words])
     shutil.copytree(finished_run, tmp_path / "runs" / "tiny_s0")
     line = fails(capsys, sweep.main, [*arguments, "--config.ppo.gamma=0.5"])
     assert "tiny_s0 was started with ppo.gamma=0.99, not 0.5" in line
@@ -259,11 +270,17 @@ def test_ctrl_c_in_a_runs_last_seconds_ends_the_sweep_after_it(tiny_config, tmp_
         (["--fit-steps", "-5"], "--fit-steps=-5: expected at least 0"),
         (["--first-steps", "50", "-3"], "--first-steps=-3: expected at least 1"),
         (["--fit-steps", "5"], "--fit-steps: goes with a policy of hoppers"),
+        (["--robot", str(POLICY / "config.json"), "--tip", "hand"], "config.json: was saved with its base and tip"),
         (["--robot", ""], "no name: no such file, and no arm of the catalogue: "),
     ],
 )
 def test_options_that_would_be_ignored_are_refused(arguments, expected, capsys):
     assert expected in fails(capsys, evaluate.main, [str(POLICY), *arguments])
+
+
+def test_steps_to_fit_v_h_with_go_with_a_learned_one(capsys):
+    line = fails(capsys, evaluate.main, [str(POLICY.parent / "hopper_ppo_s0"), "--fit-steps", "5"])
+    assert "--fit-steps: goes with a learned v_h (encoding embedding), and this policy's is none" in line
 
 
 @pytest.mark.parametrize("seed", ["-1", "1.5", "9223372036854775808"])

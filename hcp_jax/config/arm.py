@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from hcp_jax.config.checks import is_at_least_zero, is_positive, require
+from hcp_jax.config.checks import MAX_SEED, is_at_least_zero, is_positive, require
 from hcp_jax.hardware.arm import ALL_TYPES
 from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS
 from hcp_jax.hardware.joint_slots import LAYOUTS
@@ -51,6 +51,7 @@ class ArmPoolConfig:
             require(getattr(self, field) >= 1, f"pool.{field}", getattr(self, field), "at least 1")
         for field in ("robots_per_type", "heldout_per_type"):
             require(getattr(self, field) <= TYPE_STRIDE, f"pool.{field}", getattr(self, field), f"at most {TYPE_STRIDE}")
+        require(0 <= self.seed <= MAX_SEED, "pool.seed", self.seed, f"0 to {MAX_SEED}")
         require(self.split in ("train", "new"), "pool.split", self.split, "'train' or 'new'")
 
     @property

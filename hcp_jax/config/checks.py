@@ -4,6 +4,8 @@ import math
 
 from hcp_jax.errors import UserError
 
+MAX_SEED = 2**63 - 1  # what a JAX key takes
+
 
 class ConfigError(UserError):
     """A setting is unknown, of the wrong type or outside what is allowed. The message names field, value and bounds."""

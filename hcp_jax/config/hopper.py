@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from hcp_jax.config.checks import require
+from hcp_jax.config.checks import MAX_SEED, require
 from hcp_jax.hardware.ranges import HopperRanges
 from hcp_jax.physics.base import INTEGRATORS
 
@@ -28,6 +28,7 @@ class HopperPoolConfig:
     def __post_init__(self):
         require(self.num_robots >= 1, "pool.num_robots", self.num_robots, "at least 1")
         require(self.num_heldout >= 1, "pool.num_heldout", self.num_heldout, "at least 1")
+        require(0 <= self.seed <= MAX_SEED, "pool.seed", self.seed, f"0 to {MAX_SEED}")
         require(self.split in ("train", "new"), "pool.split", self.split, "'train' or 'new'")
 
 

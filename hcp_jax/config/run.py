@@ -3,7 +3,7 @@
 import dataclasses
 
 from hcp_jax.config.arm import ARM_CONDITIONINGS, OWN_ARM_CONDITIONINGS, ArmConfig, ArmPoolConfig
-from hcp_jax.config.checks import ConfigError, require
+from hcp_jax.config.checks import MAX_SEED, ConfigError, require
 from hcp_jax.config.ddpg import DDPGConfig
 from hcp_jax.config.embedding import EmbeddingConfig
 from hcp_jax.config.hopper import HopperConfig, HopperPoolConfig
@@ -15,7 +15,6 @@ from hcp_jax.physics.base import PHYSICS
 TASKS = ("hopper", "reacher", "peg_insertion")
 ALGORITHM_OF = {"hopper": "ppo", "reacher": "ddpg", "peg_insertion": "ddpg"}
 INIT_LAYERS = ("hidden", "all")
-MAX_SEED = 2**63 - 1  # what a JAX key takes
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,9 +4,9 @@ import pathlib
 from collections.abc import Sequence
 
 from hcp_jax.evaluation.appendix import make_appendix
+from hcp_jax.evaluation.files import write_json
 from hcp_jax.evaluation.groups import group_folders
-from hcp_jax.evaluation.publishing import describe_published, plot_groups, publish_runs
-from hcp_jax.evaluation.statistics import write_json
+from hcp_jax.evaluation.publishing import plot_groups, publish_runs
 from hcp_jax.evaluation.summary import SUCCESSES, summarise_runs
 from hcp_jax.evaluation.table1 import make_table1
 from hcp_jax.training.run_folder import read_config
@@ -20,14 +20,13 @@ def collect_arms(folders: Sequence[pathlib.Path], results: pathlib.Path) -> list
     whose evaluations are there.
     """
     out = results / "arms"
-    published = publish_runs(folders, out, results / "policies")
+    published, written = publish_runs(folders, out, results / "policies")
     if not published:
         return []
     write_json(out / "summary.json", summarise_runs(published))
     for task in dict.fromkeys(read_config(folder).task for folder in published):
         groups = group_folders([folder for folder in published if read_config(folder).task == task])
         plot_groups(groups, out / f"{task}.png", SUCCESSES, "success [%] on held-out robots")
-    written = [describe_published(folders, out, results / "policies")] if folders else []
     for name, make_rows in (("table1", make_table1), ("appendix", make_appendix)):
         rows = make_rows(results)
         write_json(results / f"{name}.json", rows)

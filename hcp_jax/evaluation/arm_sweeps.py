@@ -18,7 +18,7 @@ from hcp_jax.hardware.arm import ALL_TYPES, type_name
 from hcp_jax.hardware.inverse_kinematics import is_reachable
 from hcp_jax.hardware.own_arm import make_own_pool
 from hcp_jax.hardware.pool import RobotPool
-from hcp_jax.hardware.robot_file import RobotFile
+from hcp_jax.hardware.robot_file import RobotFile, describe_robot
 from hcp_jax.training import run_folder
 from hcp_jax.training.policy_file import load_policy
 
@@ -66,7 +66,10 @@ def evaluate_arms(
     record |= {"types": {}, "robots": []}
     pools = choose_pools(run, trials * robots_per_trial, types, ranges, pool_folder, own_robots or {})
     for name, pool in pools.items():
-        zero_shot = name not in run.pool_config.types and name != own_robot_name(config)
+        if own_robots:
+            zero_shot = not config.robot or describe_robot(own_robots[name]) != describe_robot(load_own_robot(config))
+        else:
+            zero_shot = name not in run.pool_config.types and name != own_robot_name(config)
         summary, rows = evaluate_type(run, state, name, pool, trials, robots_per_trial, seed)
         record["types"][name] = {"zero_shot": zero_shot} | summary
         record["robots"] += [{"type": name} | row for row in rows]

@@ -33,8 +33,8 @@ def make_catalogue_table(
         in percent.
 
     Raises:
-        ConfigError: a policy is of hoppers, an arm is not in the catalogue, a run was not trained on one of them, or two runs
-            were on the same.
+        ConfigError: a policy is of hoppers, an arm is not in the catalogue, a run was not trained on one of `names`, or two
+            runs were on the same.
         RunFolderError, CheckpointError: a policy cannot be read.
     """
     for policy in policies:
@@ -45,6 +45,9 @@ def make_catalogue_table(
         if name not in catalogue_names():
             raise ConfigError(f"--robots={name}: expected arms out of {', '.join(catalogue_names())}")
     runs = group_by_robot(fine_tuned)
+    for robot, folder in runs.items():
+        if robot not in names:
+            raise ConfigError(f"--fine-tuned={folder}: of {robot}, and --robots has {', '.join(names)}")
     robots = {name: load_robot(name) for name in names}
     records = [evaluate_arms(policy, trials, episodes_per_trial, physics=physics, own_robots=robots) for policy in policies]
     rows = []

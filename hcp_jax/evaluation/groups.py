@@ -6,14 +6,16 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 from hcp_jax.config import Config, to_dict
-from hcp_jax.training.run_folder import read_config
+from hcp_jax.training.run_folder import identify_arm, read_config
 
 T = TypeVar("T")
 
 
 def settings_of(config: Config) -> str:
-    """A key that two configs share if they differ in their seed alone, and in which run they start from."""
-    return json.dumps(to_dict(config) | {"seed": None, "init": bool(config.init)})
+    """A key that two configs share if they differ in their seed alone, in which run they start from, and in where the file of
+    the same arm is."""
+    apart = {"seed": None, "init": bool(config.init), "robot": identify_arm(config), "robot_base": "", "robot_tip": ""}
+    return json.dumps(to_dict(config) | apart)
 
 
 def group_by_settings(items: Iterable[T], config_of: Callable[[T], Config], *others: Callable[[T], object]) -> list[list[T]]:

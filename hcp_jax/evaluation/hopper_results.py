@@ -8,9 +8,9 @@ import numpy as np
 
 from hcp_jax.config import Config
 from hcp_jax.evaluation.embedding import knn_r2, plot_embedding
+from hcp_jax.evaluation.files import write_json
 from hcp_jax.evaluation.groups import group_by_settings, group_folders, label_groups
-from hcp_jax.evaluation.publishing import describe_published, plot_groups, publish_runs
-from hcp_jax.evaluation.statistics import write_json
+from hcp_jax.evaluation.publishing import plot_groups, publish_runs
 from hcp_jax.evaluation.summary import read_curve, read_run_commit, steps_to_reach, summarise_runs
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training.policy_file import load_policy
@@ -27,11 +27,10 @@ def collect_hoppers(folders: Sequence[pathlib.Path], results: pathlib.Path) -> l
     `hopper/embedding.json` and `.png` if there is one of `hopper_embedding`.
     """
     out, policies = results / "hopper", results / "policies"
-    published = publish_runs(folders, out, policies)
-    written = [describe_published(folders, out, policies)] if folders else []
+    published, written = publish_runs(folders, out, policies)
     configs = {folder: read_config(folder) for folder in published}
     new_robots = [folder for folder, config in configs.items() if config.pool.split == "new"]
-    embeddings = [folder for folder, config in configs.items() if config.name == "hopper_embedding"]
+    embeddings = [folder for folder, config in configs.items() if is_of_embedding(config)]
     main = [folder for folder in published if folder not in (*new_robots, *embeddings)]
     if main:
         groups = group_folders(main)
@@ -43,6 +42,11 @@ def collect_hoppers(folders: Sequence[pathlib.Path], results: pathlib.Path) -> l
     if embeddings:
         written.append(write_embedding(policies / embeddings[0].name, out))
     return written
+
+
+def is_of_embedding(config: Config) -> bool:
+    """Whether a run is one of `hopper_embedding`, whose v_h are points in a plane."""
+    return (config.name, config.encoding, config.embedding.size) == ("hopper_embedding", "embedding", 2)
 
 
 def write_finetune(folders: Sequence[pathlib.Path], out: pathlib.Path) -> str:

@@ -7,7 +7,7 @@ import jax
 import numpy as np
 
 from hcp_jax.algorithms.ppo import PPOState
-from hcp_jax.config import HopperPoolConfig
+from hcp_jax.config import MAX_SEED, HopperPoolConfig
 from hcp_jax.envs.episodes import Episodes
 from hcp_jax.evaluation.first_steps import regress_v_h
 from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, load_pool
@@ -71,7 +71,7 @@ def evaluate_hoppers(
     sets = choose_sets(run, state, trials * robots_per_trial, fit_steps, ranges, pool_folder)
     if first_steps:
         heldout, new, _ = sets["heldout"]
-        regressed = regress_v_h(run, state, heldout, first_steps, jax.random.key(seed + 1))
+        regressed = regress_v_h(run, state, heldout, first_steps, jax.random.key((seed + 1) % (MAX_SEED + 1)))
         sets |= {f"heldout_first_{steps}": (heldout, new, v_h[new]) for steps, v_h in regressed.items()}
     for name, (pool, rows, v_h) in sets.items():
         episodes = play_trials(run, state, pool, rows, v_h, trials, jax.random.key(seed))
@@ -101,8 +101,10 @@ def choose_sets(
     sets["heldout"] = (heldout, new, heldout_v_h(run, state.params, heldout)[new])
     fit_steps = config.embedding.fit_steps if fit_steps is None else fit_steps
     if run.ppo.conditioning.is_learned and fit_steps:
-        print(f"fitting v_h of {heldout.num_robots} new robots, {fit_steps:,} control steps each, networks frozen", flush=True)
-        sets["heldout_fitted"] = (heldout, new, EmbeddingFitter(run, heldout, fit_steps)(state)[new])
+        fitter = EmbeddingFitter(run, heldout, fit_steps)
+        each = f"{fitter.steps_per_robot:,.0f} control steps each"
+        print(f"fitting v_h of {heldout.num_robots} new robots, {each}, networks frozen", flush=True)
+        sets["heldout_fitted"] = (heldout, new, fitter(state)[new])
     return sets
 
 

@@ -6,12 +6,20 @@ from collections.abc import Mapping, Sequence
 from matplotlib.figure import Figure
 
 from hcp_jax.config import ConfigError
+from hcp_jax.evaluation.files import naming
 from hcp_jax.evaluation.summary import average_curves, read_curve
 from hcp_jax.experiment.base import TrainingState
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE, read_rows
 from hcp_jax.training.policy_file import load_policy, write_policy
-from hcp_jax.training.run_folder import CONFIG_FILE, ENVIRONMENT_FILE, find_differences, read_config, saved_robot_path
+from hcp_jax.training.run_folder import (
+    CONFIG_FILE,
+    ENVIRONMENT_FILE,
+    POLICY_FILE,
+    find_differences,
+    read_config,
+    saved_robot_path,
+)
 
 _FILES = (CONFIG_FILE, ENVIRONMENT_FILE, TIMING_FILE, METRICS_FILE)  # of a run, the one last that makes it one to be found
 
@@ -25,40 +33,54 @@ def _is_evaluated(folder: pathlib.Path) -> bool:
     return (folder / METRICS_FILE).exists() and bool(read_rows(folder / METRICS_FILE))
 
 
-def publish_runs(folders: Sequence[pathlib.Path], out: pathlib.Path, policies: pathlib.Path) -> list[pathlib.Path]:
+def publish_runs(
+    folders: Sequence[pathlib.Path], out: pathlib.Path, policies: pathlib.Path
+) -> tuple[list[pathlib.Path], list[str]]:
     """Writes each run's newest policy to `policies` and copies its metrics to `out/runs`.
 
     All of `folders` are read before anything is written: one that cannot be read leaves the results as they were.
 
     Returns:
-        all folders of `out/runs`, those of earlier calls too: what tables and curves are made of.
+        all folders of `out/runs`, those of earlier calls too: what tables and curves are made of; and lines about what was
+        written, and which evaluations are of a policy that is no longer there.
 
     Raises:
-        ConfigError: a policy of that name is published that was trained with other settings; nothing is written.
+        ConfigError: a policy of that name is published that was trained with other settings, or for longer; nothing is
+            written.
     """
     for folder in folders:
-        _check_replaceable(folder, policies / folder.name)
+        _check_replaceable(folder, policies / folder.name, out / "runs" / folder.name)
     read = [(folder.name, *_read_run(folder)) for folder in folders]
+    lines = [f"{out}/runs, {policies}: {', '.join(folder.name for folder in folders)}"] if folders else []
     for name, files, state in read:
         _write_files(policies / name, {key: files[key] for key in files if key not in (TIMING_FILE, METRICS_FILE)})
+        path = policies / name / POLICY_FILE
+        before = path.read_bytes() if path.exists() else None
         write_policy(policies / name, state)
+        if before not in (None, path.read_bytes()):
+            stale = [*(out / "evaluations").glob(f"{name}.json"), *(out / "evaluations").glob(f"{name}_*.json")]
+            lines += [f"{record}: of the policy that {policies / name} held before; evaluate it anew" for record in stale]
         _write_files(out / "runs" / name, files)
-    return find_runs(out / "runs")
+    return find_runs(out / "runs"), lines
 
 
-def _check_replaceable(folder: pathlib.Path, published: pathlib.Path) -> None:
-    """Raises ConfigError if another run than `folder` is published under its name."""
-    differences = find_differences(read_config(published), read_config(folder)) if published.exists() else []
+def _check_replaceable(folder: pathlib.Path, policy: pathlib.Path, run: pathlib.Path) -> None:
+    """Raises ConfigError if another run than `folder` is published under its name, in the folders `policy` and `run`."""
+    differences = find_differences(read_config(policy), read_config(folder)) if policy.exists() else []
     if differences:
         name, old, new = differences[0]
         raise ConfigError(
-            f"{folder}: its {name} is {new!r}, and {old!r} in {published}, which it would replace; name it otherwise"
+            f"{folder}: its {name} is {new!r}, and {old!r} in {policy}, which it would replace; name it otherwise"
         )
+    steps, published = (_last_steps(each) for each in (folder, run))
+    if steps < published:
+        raise ConfigError(f"{folder}: evaluated up to {steps:,} steps, and {run}, which it would replace, up to {published:,}")
 
 
-def describe_published(folders: Sequence[pathlib.Path], out: pathlib.Path, policies: pathlib.Path) -> str:
-    """A line about what `publish_runs` wrote."""
-    return f"{out}/runs, {policies}: {', '.join(folder.name for folder in folders)}"
+def _last_steps(folder: pathlib.Path) -> int:
+    """Control steps at a run's last evaluation; 0 of one that is not there."""
+    with naming(folder / METRICS_FILE):
+        return max((int(row["env_steps"]) for row in read_rows(folder / METRICS_FILE)), default=0)
 
 
 def _read_run(folder: pathlib.Path) -> tuple[dict[str, bytes], TrainingState]:

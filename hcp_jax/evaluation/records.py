@@ -1,58 +1,14 @@
-"""Reading published records back. What is damaged is an error that names its file."""
+"""Published records as they are read back: tables, evaluations and rehearsals."""
 
-import contextlib
-import csv
 import dataclasses
-import json
-import math
 import pathlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
-from hcp_jax.errors import UserError
-from hcp_jax.evaluation.summary import read_curve
-from hcp_jax.training.metrics import METRICS_FILE
-from hcp_jax.training.run_folder import RunFolderError
+from hcp_jax.evaluation.files import naming, number, optional_number, read_json
 
 QUANTILES = (0.0, 0.25, 0.5, 0.75, 0.95, 1.0)  # of the final distance, in records of arms
-
-
-class RecordError(UserError):
-    """A published file is damaged, or was written by another version."""
-
-
-@contextlib.contextmanager
-def naming(path: pathlib.Path) -> Iterator[None]:
-    """Whatever is wrong with a file's content becomes a RecordError that names it."""
-    try:
-        yield
-    except (RecordError, RunFolderError):  # name it already
-        raise
-    except KeyError as error:
-        raise RecordError(f"{path}: damaged or of another version (no field {error})") from error
-    except (ValueError, TypeError, AttributeError, IndexError, ArithmeticError, csv.Error) as error:
-        raise RecordError(f"{path}: damaged or of another version ({error})") from error
-
-
-def read_json(path: pathlib.Path, kind: type):
-    """The `kind` (dict or list) in a JSON file. Raises RecordError if it is damaged or holds something else."""
-    with naming(path):
-        content = json.loads(path.read_text())
-        if not isinstance(content, kind):
-            raise TypeError(f"holds a {type(content).__name__}, expected a {kind.__name__}")
-        return content
-
-
-def number(value: object) -> float:
-    """A finite number of a record. Raises ValueError."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{value!r} is no finite number")
-    return float(value)
-
-
-def optional_number(value: object) -> float | None:
-    return None if value is None else number(value)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -217,9 +173,3 @@ def _rehearsed(values: dict) -> Rehearsed:
 def _numbers(values: list | None) -> np.ndarray | None:
     """[N] numbers, None if there are none."""
     return np.asarray([number(value) for value in values]) if values else None
-
-
-def read_learning_curve(folder: pathlib.Path, column: str) -> np.ndarray:
-    """`summary.read_curve` of a published run: [E, 2]. Raises RecordError if its metrics are damaged."""
-    with naming(folder / METRICS_FILE):
-        return read_curve(folder, column)

@@ -1,8 +1,6 @@
 """What an evaluation says: of what it is, statistics over trials, and a row per robot."""
 
-import json
 import pathlib
-import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,9 +11,6 @@ from hcp_jax.experiment.base import Experiment
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.physics.base import chosen_integrator
 from hcp_jax.training import run_folder
-
-# A list of numbers that json.dumps spreads over lines. Texts hold no line breaks in JSON, so it is no part of one.
-_NUMBERS = re.compile(r"\[\n([-+\d.eE,\s]+)\]")
 
 
 def describe_evaluation(
@@ -75,10 +70,3 @@ def robot_rows(pool: RobotPool, trials: Sequence[Episodes]) -> list[dict]:
                 }
             )
     return rows
-
-
-def write_json(path: pathlib.Path, record: dict | list) -> None:
-    """Writes one record, indented, lists of numbers on one line, with numbers that JSON has."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(record, indent=1, allow_nan=False)
-    path.write_text(_NUMBERS.sub(lambda match: "[" + " ".join(match[1].split()) + "]", text) + "\n")

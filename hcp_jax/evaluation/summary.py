@@ -1,13 +1,13 @@
 """One row per algorithm from run folders: what `results/*/summary.json` holds."""
 
 import dataclasses
-import json
 import pathlib
 from collections.abc import Sequence
 
 import numpy as np
 
 from hcp_jax.config import Config
+from hcp_jax.evaluation.files import naming, read_json
 from hcp_jax.evaluation.groups import group_by_settings
 from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE, read_rows
 from hcp_jax.training.run_folder import ENVIRONMENT_FILE, read_config
@@ -78,21 +78,26 @@ def name_algorithm(config: Config) -> str:
 def read_wall_seconds(folder: pathlib.Path) -> float:
     """Time that training took, without what was lost between the newest checkpoint and a kill.
 
-    Seconds go on where a run is resumed; in files from before they did, each process counts from 0.
+    Seconds go on where a run is resumed; in files from before they did, each process counts from 0. Raises RecordError if the
+    file is damaged.
     """
-    seconds = [float(row["seconds"]) for row in read_rows(folder / TIMING_FILE)]
+    with naming(folder / TIMING_FILE):
+        seconds = [float(row["seconds"]) for row in read_rows(folder / TIMING_FILE)]
     return sum(now for now, after in zip(seconds, [*seconds[1:], 0.0], strict=True) if after < now)
 
 
 def read_run_commit(folder: pathlib.Path) -> str:
-    """The commit that a run was started from."""
-    return json.loads((folder / ENVIRONMENT_FILE).read_text())["commit"] or "unknown"
+    """The commit that a run was started from. Raises RecordError if its file is damaged."""
+    record = read_json(folder / ENVIRONMENT_FILE, dict)
+    with naming(folder / ENVIRONMENT_FILE):
+        return record["commit"] or "unknown"
 
 
 def read_curve(folder: pathlib.Path, column: str) -> np.ndarray:
-    """Control steps and `column` of each evaluation of a run: [E, 2]."""
-    rows = read_rows(folder / METRICS_FILE)
-    points = [(int(row["env_steps"]), float(row[column])) for row in rows if row.get(column)]
+    """Control steps and `column` of each evaluation of a run: [E, 2]. Raises RecordError if its metrics are damaged."""
+    with naming(folder / METRICS_FILE):
+        rows = read_rows(folder / METRICS_FILE)
+        points = [(int(row["env_steps"]), float(row[column])) for row in rows if row.get(column)]
     return np.asarray(points).reshape(-1, 2)
 
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hcp_jax.config import ArmConfig, ArmPoolConfig, Config
+from hcp_jax.evaluation.files import naming, number, optional_number, read_json
 from hcp_jax.evaluation.groups import group_by_settings
-from hcp_jax.evaluation.records import naming, read_json
 from hcp_jax.evaluation.summary import deviation_over_seeds, name_algorithm, read_run_commit, read_wall_seconds
 from hcp_jax.training.run_folder import read_config
 
@@ -23,6 +23,8 @@ PAPER = {
     ("peg_insertion", True, "I"): (15, (23.5, 4.22), (0.2, 0.4)),
 }
 
+
+_MEASURED = ("checkpoint_env_steps", "trials", "robots_per_trial")  # what evaluations of one row have in common
 
 Runs = Sequence[tuple[str, dict, Config]]  # of one experiment: policy, record and config of each seed (`group_evaluations`)
 
@@ -57,10 +59,18 @@ def group_evaluations(results: pathlib.Path) -> Sequence[Runs]:
             record, config = read_json(path, dict), read_config(folder)
             assert isinstance(config.pool, ArmPoolConfig)
             with naming(path):
+                _check_record(record)
                 if len(config.pool.left_out) == 1 and config.pool.left_out[0] in record["types"]:
                     runs.append((path.stem, record, config))
-    measured = ("checkpoint_env_steps", "trials", "robots_per_trial")
-    return group_by_settings(runs, lambda run: run[2], lambda run: tuple(run[1][name] for name in measured))
+    return group_by_settings(runs, lambda run: run[2], lambda run: tuple(run[1][name] for name in _MEASURED))
+
+
+def _check_record(record: dict) -> None:
+    """Raises KeyError, TypeError or ValueError unless an evaluation's record has what tables are made of."""
+    for name in _MEASURED:
+        number(record[name])
+    for outcome in record["types"].values():
+        number(outcome["success_mean"]), number(outcome["success_std"]), optional_number(outcome["reachable_success_mean"])
 
 
 def left_out_type(config: Config) -> str:

@@ -1,7 +1,6 @@
 """The arm's experiments: DDPG with hindsight on a pool of arm types, evaluated on held-out variants and on types left out."""
 
 import dataclasses
-import math
 import os
 import pathlib
 from collections.abc import Callable
@@ -235,8 +234,6 @@ def first_of_each_type(pool: RobotPool, count: int) -> np.ndarray:
 
 def summarise(kind: str, episodes: GoalEpisodes) -> dict[str, float | None]:
     """Success in percent, final distance and episode length of one kind of robots."""
-    if not len(episodes.index):
-        return {f"{kind}_success": math.nan}
     return {
         f"{kind}_success": 100.0 * float(episodes.success.mean()),
         f"{kind}_final_distance": float(episodes.final_distance.mean()),

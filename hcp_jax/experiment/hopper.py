@@ -181,19 +181,24 @@ class EmbeddingFitter:
 
     It does what gave the training robots theirs, starting from their mean: v_h is identified under the actor that those were
     identified under, or it learns from policy and value loss.
+
+    Attributes:
+        steps_per_robot: control steps that it takes of each robot, in the mean.
     """
 
     def __init__(self, run: HopperExperiment, pool: RobotPool, steps_per_robot: int):
         """Args:
         run: the experiment whose robots the networks were trained on.
         pool: the new robots.
-        steps_per_robot: control steps of experience with each of them, collected in `num_envs` environments.
+        steps_per_robot: control steps of experience with each of them, collected in `num_envs` environments; as near to it
+            as whole iterations come.
         """
         config = run.config
         env_steps = steps_per_robot * pool.num_robots
         self._identify_iterations = run.ppo.identify_iterations
         self._num_robots = pool.num_robots
         self._num_iterations = max(1, round(env_steps / config.batch_size))
+        self.steps_per_robot = self._num_iterations * config.batch_size / pool.num_robots
         self._key = jax.random.fold_in(jax.random.key(config.seed), FIT)
         self._identified: jax.Array | None = None
         self._ppo = PPO(

@@ -27,6 +27,15 @@ def find_robot(name: str | pathlib.Path) -> pathlib.Path:
 
 
 def load_robot(name: str | pathlib.Path, base: str | None = None, tip: str | None = None) -> RobotFile:
-    """`read_robot` of an arm of the catalogue, by its name, or of a file; or the arm that `save_robot` wrote."""
+    """`read_robot` of an arm of the catalogue, by its name, or of a file; or the arm that `save_robot` wrote, whose base and
+    tip are chosen already.
+
+    Raises:
+        RobotFileError: there is no such arm, it cannot be read, or `base` or `tip` is given for a saved one.
+    """
     path = find_robot(name)
-    return read_saved_robot(path) if path.suffix == ".json" else read_robot(path, base, tip)
+    if path.suffix != ".json":
+        return read_robot(path, base, tip)
+    if base or tip:
+        raise RobotFileError(f"{path}: was saved with its base and tip; expected neither --base nor --tip")
+    return read_saved_robot(path)

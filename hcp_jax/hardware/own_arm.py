@@ -78,7 +78,8 @@ def _make_pool(task: str, chains: list[Chain], start_angles: np.ndarray) -> Robo
 
 
 def compare_with(own: RobotPool, trained: RobotPool) -> list[Entry]:
-    """Every entry of the one arm in `own` beside the range of those in `trained`, joint by joint."""
+    """The numbers of the one arm in `own` beside the range of those in `trained`, joint by joint, then the tip's position in
+    the last joint's frame. Orientations are left out: their numbers have no ranges."""
     entries = []
     for slot in range(int(own.hardware["joint_mask"][0].sum())):
         rows = np.flatnonzero(trained.hardware["joint_mask"][:, slot])
@@ -87,6 +88,10 @@ def compare_with(own: RobotPool, trained: RobotPool) -> list[Entry]:
             columns[f"position {letter}"] = (
                 own.hardware["chain_pos"][0, slot, axis],
                 trained.hardware["chain_pos"][rows, slot, axis],
+            )
+            columns[f"centre of mass {letter}"] = (
+                own.hardware["link_com"][0, slot, axis],
+                trained.hardware["link_com"][rows, slot, axis],
             )
         for side, word in enumerate(("low", "high")):
             columns[f"range {word}"] = (
@@ -101,7 +106,18 @@ def compare_with(own: RobotPool, trained: RobotPool) -> list[Entry]:
             )
             for name, (value, values) in columns.items()
         ]
+    tip, tips = _tip_positions(own)[0], _tip_positions(trained)
+    entries += [
+        Entry(f"tip position {letter}", float(tip[axis]), float(tips[:, axis].min()), float(tips[:, axis].max()))
+        for axis, letter in enumerate("xyz")
+    ]
     return entries
+
+
+def _tip_positions(pool: RobotPool) -> np.ndarray:
+    """Each arm's tip in the frame of its last joint [m]: [N, 3]."""
+    num_joints = pool.hardware["joint_mask"].sum(axis=1).astype(int)
+    return pool.hardware["chain_pos"][np.arange(pool.num_robots), num_joints]
 
 
 def find_nearest(own: RobotPool, trained: RobotPool) -> tuple[str, int, float]:

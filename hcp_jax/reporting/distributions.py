@@ -6,7 +6,8 @@ import numpy as np
 
 from hcp_jax.config import ArmConfig
 from hcp_jax.evaluation.appendix import PAPER_DAMPING
-from hcp_jax.evaluation.records import Evaluation, Outcome, naming, read_evaluation
+from hcp_jax.evaluation.files import naming
+from hcp_jax.evaluation.records import Evaluation, Outcome, read_evaluation
 from hcp_jax.reporting.curves import make_curves, train_commands
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import Spread, draw_spreads

@@ -4,9 +4,9 @@ import pathlib
 
 import numpy as np
 
+from hcp_jax.evaluation.files import naming, number, optional_number, read_json
 from hcp_jax.evaluation.groups import label_groups
 from hcp_jax.evaluation.hopper_results import name_start
-from hcp_jax.evaluation.records import naming, number, optional_number, read_json
 from hcp_jax.evaluation.summary import RETURNS, deviation_over_seeds
 from hcp_jax.reporting.curves import SPREAD, draw_groups
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table

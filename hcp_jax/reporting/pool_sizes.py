@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hcp_jax.config import ArmPoolConfig, Config
-from hcp_jax.evaluation.records import Evaluation, naming, read_evaluation
+from hcp_jax.evaluation.files import naming
+from hcp_jax.evaluation.records import Evaluation, read_evaluation
 from hcp_jax.reporting.curves import LABEL, LIMITS, make_curves
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import draw_points

@@ -5,9 +5,10 @@ import pathlib
 from collections.abc import Sequence
 
 from hcp_jax.config import Config, ConfigError
+from hcp_jax.evaluation.files import naming
 from hcp_jax.evaluation.groups import group_by_settings
-from hcp_jax.evaluation.records import TableRow, naming, read_learning_curve, read_table
-from hcp_jax.evaluation.summary import SeedCurve, average_curves
+from hcp_jax.evaluation.records import TableRow, read_table
+from hcp_jax.evaluation.summary import SeedCurve, average_curves, read_curve
 from hcp_jax.training.metrics import METRICS_FILE
 from hcp_jax.training.run_folder import CONFIG_FILE, read_config
 
@@ -72,4 +73,4 @@ class Published:
 
 def average_runs(runs: Sequence[Run], column: str) -> SeedCurve | None:
     """A column of several seeds' metrics as one curve; None without points. Raises RecordError if a file is damaged."""
-    return average_curves([read_learning_curve(run.folder, column) for run in runs])
+    return average_curves([read_curve(run.folder, column) for run in runs])

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from hcp_jax.evaluation.records import Rehearsal, Rehearsed, naming, read_rehearsal
+from hcp_jax.evaluation.files import naming
+from hcp_jax.evaluation.records import Rehearsal, Rehearsed, read_rehearsal
 from hcp_jax.reporting.distributions import DISTANCE, SUCCESS_DISTANCE, VIOLINS
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import Spread, draw_spreads

@@ -3,7 +3,8 @@
 from collections.abc import Iterable, Sequence
 
 from hcp_jax.evaluation.appendix import PAPER_OTHER_ARMS, PAPER_TYPES, paper_by_type
-from hcp_jax.evaluation.records import TableRow, read_learning_curve
+from hcp_jax.evaluation.records import TableRow
+from hcp_jax.evaluation.summary import read_curve
 from hcp_jax.hardware.arm import OTHER_ARMS
 from hcp_jax.reporting.page import Item, Row, Section, Table
 from hcp_jax.reporting.published import Published
@@ -181,7 +182,7 @@ def describe_progress(published: Published, name: str) -> str:
     if not groups:
         return ""
     run = groups[0][0]
-    curve = read_learning_curve(run.folder, "train_types_success")
+    curve = read_curve(run.folder, "train_types_success")
     done = curve[-1, 0] if len(curve) else 0.0
     return f"{done / 1e6:.2f} of {run.config.total_env_steps / 1e6:.2f}"
 

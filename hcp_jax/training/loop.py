@@ -142,6 +142,7 @@ class TrainingLoop:
         where = f"{len(devices)} x {devices[0].device_kind}" if len(devices) > 1 else devices[0].device_kind
         where += f" of {num_processes} processes" if num_processes > 1 else ""
         self._progress.say(f"on {where}; compiling the training step")
+        self._keep_best(state)
         while self._iteration < run.num_iterations:
             next_eval = min((self._iteration // self._eval_iterations + 1) * self._eval_iterations, run.num_iterations)
             count = min(self._chunk, next_eval - self._iteration)
@@ -157,6 +158,19 @@ class TrainingLoop:
                 return self._save_and_stop(state)
         self._finish()
         return metrics
+
+    def _keep_best(self, state: TrainingState) -> None:
+        """Where a run was killed after it had saved its newest checkpoint and before it had saved that as its best one."""
+        rows = self._metrics.rows() if self._metrics else []
+        is_newest = bool(rows) and int(rows[-1]["env_steps"]) == self._env_steps
+        is_best = is_newest and float(rows[-1][self._run.best_metric]) >= self._best_so_far()
+        if any_process(is_best):
+            self._checkpoints.save(self._iteration, state, is_best=True)
+
+    def _best_so_far(self) -> float:
+        """The highest of the best metric in this process's `metrics.csv`."""
+        rows = self._metrics.rows() if self._metrics else []
+        return max((float(row[self._run.best_metric]) for row in rows), default=-math.inf)
 
     def _check(self, state: TrainingState) -> None:
         overflow = int(state.overflow)
@@ -192,8 +206,7 @@ class TrainingLoop:
         state = state.replace(sums=jax.tree.map(jnp.zeros_like, state.sums))
         is_best = False
         if self._metrics:
-            best = max((float(row[run.best_metric]) for row in self._metrics.rows()), default=-math.inf)
-            is_best = metrics[run.best_metric] >= best
+            is_best = metrics[run.best_metric] >= self._best_so_far()
             # The row first: a resumed run drops rows after its checkpoint, but could not make up for one that is missing.
             self._metrics.write(metrics, self._timing(self._metrics.seconds_before))
         self._checkpoints.save(self._iteration, state, any_process(is_best))

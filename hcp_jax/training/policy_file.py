@@ -32,9 +32,10 @@ def read_policy(folder: pathlib.Path, template: TrainingState) -> TrainingState:
         CheckpointError: the file is damaged, was written by another version, or is of another architecture than `template`.
     """
     path, empty = folder / run_folder.POLICY_FILE, template.published()
+    content = path.read_bytes()
     try:
-        fields = flax.serialization.msgpack_restore(path.read_bytes())
-    except ValueError as error:
+        fields = flax.serialization.msgpack_restore(content)
+    except Exception as error:  # flax and msgpack raise many kinds for damaged files
         raise CheckpointError(f"{path}: damaged ({type(error).__name__})") from error
     if not isinstance(fields, dict) or fields.keys() != empty.keys():
         held = ", ".join(map(str, fields)) if isinstance(fields, dict) else type(fields).__name__
@@ -43,7 +44,7 @@ def read_policy(folder: pathlib.Path, template: TrainingState) -> TrainingState:
     check_architecture(shapes, template, str(path))
     try:
         policy = flax.serialization.from_state_dict(empty, jax.tree.map(_widen, fields))
-    except ValueError as error:
+    except (ValueError, TypeError) as error:
         raise CheckpointError(f"{path}: another architecture ({one_line(error)})") from error
     return template.with_published(policy)
 

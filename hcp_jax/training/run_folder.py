@@ -29,6 +29,7 @@ LOCK_FILE = ".lock"
 ROBOT_FOLDER = "robot"  # of a run on somebody's arm: what its file said when the run started
 # Fields that a resumed run may change.
 _CHANGEABLE = {"total_env_steps", "keep_checkpoints"}
+_OF_ARM = ("robot", "robot_base", "robot_tip")
 _PACKAGES = ("jax", "jaxlib", "mujoco", "mujoco-mjx", "warp-lang", "brax", "flax", "optax", "orbax-checkpoint", "numpy")
 
 
@@ -47,24 +48,28 @@ def check_resumable(folder: pathlib.Path, config: Config) -> None:
     saved = read_config(folder)
     if (folder / POLICY_FILE).exists():
         raise RunFolderError(f"--resume: {folder} is a published policy; start a new run from it with --config.init={folder}")
-    of_robot = {"robot", "robot_base", "robot_tip"} if saved.robot and config.robot else set()
     for name, old, new in find_differences(saved, config):
-        if name not in _CHANGEABLE | of_robot:
+        if name in _OF_ARM and saved.robot and config.robot:
+            raise RunFolderError(f"--resume: {folder} was started with another arm than robot={config.robot!r} is now")
+        if name not in _CHANGEABLE:
             raise RunFolderError(f"--resume: {folder} was started with {name}={old!r}, not {new!r}")
-    if of_robot and describe_robot(load_own_robot(saved)) != describe_robot(load_own_robot(config)):
-        raise RunFolderError(f"--resume: {folder} was started with another arm than robot={config.robot!r} is now")
 
 
 def find_differences(one: Config, other: Config) -> list[tuple[str, object, object]]:
     """Dotted names of the fields in which two configs differ, with both values; None is that of a field which one lacks.
 
-    Of an arm that is saved in a run folder, its name counts.
+    Of an arm from a file counts what the file says, not where it is. Raises RobotFileError where it cannot be read.
     """
     old, new = _flatten(to_dict(one)), _flatten(to_dict(other))
-    for flat in (old, new):
-        if pathlib.Path(flat["robot"]).parent.name == ROBOT_FOLDER:
-            flat["robot"] = pathlib.Path(flat["robot"]).stem
-    return [(name, old.get(name), new.get(name)) for name in old | new if old.get(name) != new.get(name)]
+    same = _OF_ARM if identify_arm(one) == identify_arm(other) else ()
+    return [(name, old.get(name), new.get(name)) for name in old | new if name not in same and old.get(name) != new.get(name)]
+
+
+def identify_arm(config: Config) -> str | dict:
+    """What `config.robot` is: a name of the catalogue, what somebody's file says, or nothing. Raises RobotFileError."""
+    if config.robot in ("", *catalogue_names()):
+        return config.robot
+    return describe_robot(load_own_robot(config))
 
 
 @contextlib.contextmanager

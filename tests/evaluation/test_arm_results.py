@@ -1,4 +1,5 @@
 import json
+import pathlib
 import shutil
 
 import pytest
@@ -8,6 +9,8 @@ from hcp_jax.evaluation.appendix import make_appendix
 from hcp_jax.evaluation.arm_sweeps import evaluate_arms
 from hcp_jax.evaluation.table1 import make_table1
 from hcp_jax.training.metrics import read_rows
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -101,3 +104,53 @@ def test_a_run_of_other_settings_does_not_replace_a_published_one(results, finis
     assert exit_info.value.code == 2
     assert "its total_env_steps is 80, and 320 in" in capsys.readouterr().err
     assert {path: path.read_bytes() for path in results.rglob("*") if path.is_file()} == before
+
+
+def test_a_run_that_got_less_far_does_not_replace_a_published_one(results, finished_arms, tmp_path, capsys):
+    folder = tmp_path / "runs" / "arms_s0"
+    shutil.copytree(finished_arms, folder)
+    (folder / "metrics.csv").write_text("".join((folder / "metrics.csv").read_text().splitlines(keepends=True)[:2]))
+    before = {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
+    with pytest.raises(SystemExit) as exit_info:
+        collect.main([str(folder.parent), "--out", str(results)])
+    assert exit_info.value.code == 2
+    assert "arms_s0, which it would replace, up to 320" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in results.rglob("*") if path.is_file()} == before
+
+
+def test_an_evaluation_of_a_policy_that_was_replaced_is_named(results, finished_arms, tmp_path, capsys):
+    shutil.copytree(results, tmp_path / "results")
+    shutil.copytree(finished_arms, tmp_path / "runs" / "arms_s0")
+    record = tmp_path / "results" / "arms" / "evaluations" / "arms_s0.json"
+    record.parent.mkdir(exist_ok=True)
+    shutil.copy(ROOT / "results" / "arms" / "evaluations" / "reacher_ddpg_leave_h_s0.json", record)
+    collect.main([str(tmp_path / "runs"), "--out", str(tmp_path / "results")])
+    assert "evaluate it anew" not in capsys.readouterr().out
+    policy = tmp_path / "results" / "policies" / "arms_s0" / "policy.msgpack"
+    policy.write_bytes(policy.read_bytes()[:-1] + b"\x01")
+    collect.main([str(tmp_path / "runs"), "--out", str(tmp_path / "results")])
+    assert f"{record}: of the policy that" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        ("arms/evaluations/arms_s0.json", {"types": {}}, "no field 'checkpoint_env_steps'"),
+        (
+            "arms/evaluations/arms_s0.json",
+            {"checkpoint_env_steps": 1, "trials": 1, "robots_per_trial": 1, "types": {"H": {}}},
+            "no field 'success_mean'",
+        ),
+        ("arms/runs/arms_s0/environment.json", {}, "no field 'commit'"),
+    ],
+)
+def test_collecting_names_the_damaged_file(results, tmp_path, capsys, name, content, expected):
+    shutil.copytree(results, tmp_path / "results")
+    path = tmp_path / "results" / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(json.dumps(content))
+    with pytest.raises(SystemExit) as exit_info:
+        collect.main(["--out", str(tmp_path / "results")])
+    assert exit_info.value.code == 2
+    error = capsys.readouterr().err
+    assert f"{path}: damaged or of another version ({expected}" in error

@@ -74,6 +74,8 @@ def test_what_no_table_can_be_made_of_is_said(finished_arms, panda_run, tiny_con
         make_catalogue_table([finished_arms], fine_tuned=[finished_arms])
     with pytest.raises(ConfigError, match="is of panda too"):
         make_catalogue_table([finished_arms], fine_tuned=[panda_run, panda_run])
+    with pytest.raises(ConfigError, match="panda: of panda, and --robots has sawyer, ur5e"):
+        make_catalogue_table([finished_arms], fine_tuned=[panda_run], names=["ur5e", "sawyer"])
     (tmp_path / "config.json").write_text(json.dumps(to_dict(tiny_config)))
     with pytest.raises(ConfigError, match="a policy of hoppers"):
         make_catalogue_table([finished_arms, tmp_path])

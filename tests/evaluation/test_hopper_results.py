@@ -10,7 +10,7 @@ import pytest
 from hcp_jax import collect, sweep
 from hcp_jax.config import to_dict
 from hcp_jax.evaluation.groups import group_folders
-from hcp_jax.evaluation.hopper_results import write_finetune
+from hcp_jax.evaluation.hopper_results import is_of_embedding, write_finetune
 from hcp_jax.evaluation.hopper_sweeps import evaluate_hoppers
 from hcp_jax.evaluation.summary import read_curve, read_wall_seconds, steps_to_reach, summarise_runs
 from hcp_jax.training import run_folder
@@ -167,6 +167,19 @@ def test_a_run_whose_policy_cannot_be_read_leaves_the_results_as_they_were(swept
     assert exit_info.value.code == 2
     assert "without_s1: holds no checkpoint" in capsys.readouterr().err
     assert not (tmp_path / "results").exists()
+
+
+def test_fitting_says_how_many_steps_it_takes_of_each_robot(swept, capsys):
+    evaluate_hoppers(swept / "runs" / "with_s1", 1, 4, fit_steps=1)
+    assert "fitting v_h of 4 new robots, 16 control steps each" in capsys.readouterr().out  # an iteration of 64
+
+
+def test_only_an_embedding_in_the_plane_is_drawn_as_one(tiny_config):
+    config = dataclasses.replace(tiny_config, name="hopper_embedding", encoding="embedding")
+    sizes = {size: dataclasses.replace(config, embedding=dataclasses.replace(config.embedding, size=size)) for size in (2, 8)}
+    assert is_of_embedding(sizes[2])
+    assert not is_of_embedding(sizes[8])
+    assert not is_of_embedding(dataclasses.replace(sizes[2], encoding="none"))
 
 
 def test_fine_tuning_reports_when_each_warm_start_reaches_what_scratch_ends_with(tiny_config, tmp_path):

@@ -1,5 +1,7 @@
+import dataclasses
 import itertools
 import json
+import shutil
 
 import jax.numpy as jnp
 import numpy as np
@@ -111,6 +113,22 @@ def test_a_joint_that_no_training_arm_has_lies_outside(trained):
     seventh = [entry for entry in entries if entry.name.startswith("joint 6 ")]
     assert len(seventh) > 5
     assert not any(entry.is_inside or entry.low is not None for entry in seventh)
+
+
+def test_a_long_tool_and_a_displaced_mass_lie_outside(one_of_them, trained):
+    chain = one_of_them.chain
+    far = dataclasses.replace(chain, pos=chain.pos + np.eye(len(chain.pos))[:, -1:], com=chain.com + 1.0)
+    entries = compare_with(make_own_pool("peg_insertion", dataclasses.replace(one_of_them, chain=far)), trained)
+    outside = {entry.name for entry in entries if not entry.is_inside}
+    assert {"tip position x", "tip position y", "tip position z", "joint 0 centre of mass x"} <= outside
+    assert "joint 0 position x" not in outside
+
+
+def test_an_arm_from_a_file_is_zero_shot_whatever_its_file_is_called(finished_arms, tmp_path):
+    path = shutil.copy(TEMPLATE, tmp_path / "A.xml")
+    evaluate.main([str(finished_arms), "--robot", str(path), "--tip", "l6", "--trials", "1", "--robots-per-trial", "1",
+                   "--json", str(tmp_path / "out.json")])  # fmt: skip
+    assert json.loads((tmp_path / "out.json").read_text())["types"]["A"]["zero_shot"]
 
 
 def test_a_policy_is_evaluated_on_ones_own_arm(finished_arms, tmp_path):

@@ -15,8 +15,8 @@ import pytest
 from hcp_jax import report
 from hcp_jax.config import Config
 from hcp_jax.evaluation.appendix import PAPER_DAMPING, PAPER_TRAINING_TYPES, PAPER_TYPES
+from hcp_jax.evaluation.files import write_json
 from hcp_jax.evaluation.records import read_evaluation, read_table
-from hcp_jax.evaluation.statistics import write_json
 from hcp_jax.evaluation.table1 import PAPER
 from hcp_jax.hardware.arm import arm_spec
 from hcp_jax.hardware.start_poses import start_angles

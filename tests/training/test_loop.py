@@ -51,6 +51,19 @@ def test_the_newest_checkpoints_and_the_best_are_kept(finished_run, tiny_config)
     assert checkpoints.best() == best
 
 
+def test_a_best_checkpoint_that_a_kill_prevented_is_made_up_for(finished_run, tiny_config, tmp_path):
+    folder = shutil.copytree(finished_run, tmp_path / "run")
+    *before, last = (folder / "metrics.csv").read_text().splitlines()
+    column = before[0].split(",").index("train_return_mean")
+    words = last.split(",")
+    words[column] = "1e9"
+    (folder / "metrics.csv").write_text("\n".join([*before, ",".join(words)]) + "\n")
+    for path in (folder / "checkpoints" / "best").iterdir():
+        shutil.rmtree(path)
+    loop.train(tiny_config, folder, resume=True)
+    assert Checkpoints(folder / "checkpoints", read_only=True).best() == 8
+
+
 @pytest.mark.parametrize("cut", [3, *(pytest.param(cut, marks=pytest.mark.slow) for cut in (2, 5))])
 def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished_run, tiny_config, tmp_path, monkeypatch, cut):
     """Cut after `cut` of 8 iterations: between two evaluations and at one."""

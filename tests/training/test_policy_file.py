@@ -36,6 +36,20 @@ def test_a_policy_of_another_version_is_refused_by_what_it_holds(trained, tmp_pa
             read_policy(tmp_path, trained)
 
 
+def test_a_flipped_bit_is_a_damaged_policy_or_another_one_but_no_crash(trained, tmp_path):
+    path = write_policy(tmp_path, trained)
+    content = path.read_bytes()
+    refused = 0
+    for place in range(0, 600, 5):
+        flipped = content[place] ^ (1 << place % 8)
+        path.write_bytes(content[:place] + bytes([flipped]) + content[place + 1 :])
+        try:
+            read_policy(tmp_path, trained)
+        except CheckpointError:
+            refused += 1
+    assert refused > 10
+
+
 def _shapes(folder):
     content = flax.serialization.msgpack_restore((folder / "policy.msgpack").read_bytes())
     return [(jax.tree_util.keystr(path), leaf.shape) for path, leaf in jax.tree_util.tree_leaves_with_path(content)]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hcp_jax import presets
+from hcp_jax.evaluation.groups import group_by_settings
 from hcp_jax.experiment.arm import load_own_robot, own_robot_name
 from hcp_jax.hardware.pool import robots_path
 from hcp_jax.hardware.robot_file import RobotFileError, read_robot_here
@@ -31,3 +32,15 @@ def test_a_run_keeps_the_arm_that_its_file_said(tiny_arms, tmp_path):
     path.write_text(path.read_text().replace('"mass"', '"weight"'))
     with pytest.raises(RobotFileError, match=r"own\.json: damaged record of an arm"):
         load_own_robot(kept)
+
+
+def test_seeds_on_the_same_arm_are_one_experiment_wherever_its_file_is(tiny_arms, tmp_path):
+    for number, text in enumerate((TEMPLATE.read_text(), TEMPLATE.read_text(), TEMPLATE.read_text().replace("3.0503", "2"))):
+        own = tmp_path / f"files{number}" / "own.xml"
+        own.parent.mkdir()
+        own.write_text(text)
+        pool = presets.one_arm(1)
+        config = dataclasses.replace(tiny_arms, pool=pool, robot=str(own), robot_tip="l6", seed=number)
+        run_folder.write_start(tmp_path / f"run{number}", config, "native")
+    groups = group_by_settings([tmp_path / f"run{number}" for number in range(3)], run_folder.read_config)
+    assert [[folder.name for folder in group] for group in groups] == [["run0", "run1"], ["run2"]]
