@@ -1,5 +1,6 @@
 """What every task publishes of its run folders: metrics, policies and curves."""
 
+import math
 import pathlib
 from collections.abc import Mapping, Sequence
 
@@ -21,6 +22,7 @@ from hcp_jax.training.run_folder import (
     saved_robot_path,
 )
 
+_LINES = ("-", "--", ":", "-.")  # of curves of one colour, of which there are ten
 _FILES = (CONFIG_FILE, ENVIRONMENT_FILE, TIMING_FILE, METRICS_FILE)  # of a run, the one last that makes it one to be found
 
 
@@ -100,18 +102,22 @@ def _write_files(folder: pathlib.Path, files: Mapping[str, bytes]) -> None:
 
 def plot_groups(groups: Mapping[str, Sequence[pathlib.Path]], path: pathlib.Path, columns: Sequence[str], label: str) -> None:
     """Mean over seeds of each group's curve, with the range over seeds shaded; one panel per column."""
-    figure = Figure((6 * len(columns), 4.5), layout="constrained")
+    legend_columns = len(columns)
+    figure = Figure((6 * len(columns), 4.5 + 0.22 * math.ceil(len(groups) / legend_columns)), layout="constrained")
     panels = figure.subplots(1, len(columns), sharey=True, squeeze=False)[0]
     for column, axes in zip(columns, panels, strict=True):
-        for name, folders in groups.items():
+        for number, (name, folders) in enumerate(groups.items()):
+            colour, style = f"C{number % 10}", _LINES[number // 10 % len(_LINES)]
             curve = average_curves([read_curve(folder, column) for folder in folders])
             if curve is None:
                 continue  # an experiment without this column
-            axes.plot(curve.steps / 1e6, curve.mean, label=f"{name} ({curve.num_seeds} seeds)")
-            axes.fill_between(curve.steps / 1e6, curve.low, curve.high, alpha=0.2)
+            seeds = f"{curve.num_seeds} seed{'s' * (curve.num_seeds > 1)}"
+            axes.plot(curve.steps / 1e6, curve.mean, style, color=colour, label=f"{name} ({seeds})")
+            axes.fill_between(curve.steps / 1e6, curve.low, curve.high, color=colour, alpha=0.2, linewidth=0)
         axes.set_title(column.replace("_", " "))
         axes.set_xlabel("control steps [million]")
         axes.grid(alpha=0.3)
     panels[0].set_ylabel(label)
-    panels[0].legend(frameon=False)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower left", ncols=legend_columns, frameon=False)
     figure.savefig(path, dpi=120)
