@@ -86,6 +86,17 @@ def test_success_by_type_is_that_of_the_evaluations(row):
             assert numbers == pytest.approx([mean, std][: len(numbers)], abs=0.0501), title
 
 
+@pytest.mark.parametrize("row", find_tables("docs/results.md", "arms of each type")[0], ids=lambda row: row["policy"])
+def test_success_by_training_robots_is_that_of_the_evaluation(row):
+    name = row["policy"].strip("`")
+    types = read_json(f"arms/pool_sizes/{name}.json")["types"]
+    config = json.loads((find_run(name) / "config.json").read_text())
+    assert config["pool"]["robots_per_type"] == int(row["arms of each type"].replace(",", ""))
+    trained = np.mean([outcome["success_mean"] for outcome in types.values() if not outcome["zero_shot"]])
+    numbers = [float(number) for number in (row["types trained on"], *row["H, zero-shot"].split(" ± "))]
+    assert numbers == pytest.approx([trained, types["H"]["success_mean"], types["H"]["success_std"]], abs=0.0501)
+
+
 @pytest.mark.parametrize("row", find_tables("README.md", "experiment", "held out")[0], ids=lambda row: row["experiment"])
 def test_hopper_returns_are_those_of_the_summary(row):
     (run,) = [run for run in read_json("hopper/summary.json") if run["name"] == row["experiment"].strip("`")]
