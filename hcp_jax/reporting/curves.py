@@ -77,9 +77,8 @@ def make_leave_one_out(published: Published, setting: Setting) -> Item:
     )
 
 
-def make_curves(published: Published, title: str, names: Sequence[str], commands: tuple[str, ...] = ()) -> Item:
-    """A panel of experiments by name, and one of those whose training robots have a learned v_h of their own. `commands` make
-    them again where they have no files of their own."""
+def make_curves(published: Published, title: str, names: Sequence[str]) -> Item:
+    """A panel of experiments by name, and one of those whose training robots have a learned v_h of their own."""
     groups = published.runs_of(names)
     panels = ((SUCCESS, "New arms of type I."), (TRAINING_ROBOTS, "Arms that were trained on, with the v_h that they learned."))
     figures = [draw_groups(published, groups, column, caption) for column, caption in panels]
@@ -87,7 +86,7 @@ def make_curves(published: Published, title: str, names: Sequence[str], commands
         title,
         describe_missing(published, names),
         figures=tuple(figure for figure in figures if figure is not None),
-        commands=commands or (*train_commands(names), RESULTS_COMMANDS[1]),
+        commands=(*train_commands(names), RESULTS_COMMANDS[1]),
     )
 
 

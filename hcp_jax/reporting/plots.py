@@ -28,7 +28,7 @@ COLOURS = {
     "random": "#56B4E9",
     "chain": "#000000",
 }
-_DISTINCT = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")  # of what does not differ in what it sees
+_DISTINCT = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # of what does not differ in what it sees
 OTHER_COLOUR = "#777777"
 _LINES = ("-", "--", ":", "-.")  # of curves that would have the same colour
 _STYLE = {
@@ -83,12 +83,14 @@ def render(draw: Callable[[Axes], None], size: tuple[float, float] = PANEL, proj
 
 
 def draw_curves(lines: Sequence[Line], label: str, limits: tuple[float, float] | None = None) -> str:
-    """Mean over seeds, with the range over seeds as a band where there are several."""
+    """Mean over seeds, with the range over seeds as a band where there are several. Coloured by what the policies see, or one
+    by one where that is the same for all."""
+    is_same = len({line.encoding for line in lines}) == 1
 
     def draw(axes: Axes) -> None:
         drawn: list[str] = []
-        for line in lines:
-            colour = COLOURS.get(line.encoding, OTHER_COLOUR)
+        for number, line in enumerate(lines):
+            colour = _DISTINCT[number % len(_DISTINCT)] if is_same else COLOURS.get(line.encoding, OTHER_COLOUR)
             style = _LINES[drawn.count(colour) % len(_LINES)]
             drawn.append(colour)
             curve = line.curve

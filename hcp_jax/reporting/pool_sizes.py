@@ -7,7 +7,7 @@ import numpy as np
 from hcp_jax.config import ArmPoolConfig, Config
 from hcp_jax.evaluation.files import naming
 from hcp_jax.evaluation.records import Evaluation, read_evaluation
-from hcp_jax.reporting.curves import LABEL, LIMITS, make_curves
+from hcp_jax.reporting.curves import LABEL, LEFT_OUT, LIMITS, SUCCESS, draw_groups
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import draw_points
 from hcp_jax.reporting.published import Published
@@ -25,11 +25,10 @@ COMMANDS = (
 
 def pool_size_section(published: Published) -> Section:
     """Success on new arms of the types trained on, and on the type left out, by the number of arms of each type trained on."""
-    curves = make_curves(published, "Their training", NAMES, COMMANDS[:2])
     return Section(
         "pool_sizes",
         "Success against the number of training robots",
-        (make_sizes(published), curves),
+        (make_sizes(published), make_size_curves(published)),
         "Exp. I, HCP-E on the reacher, with more and fewer arms of each of the eight types, at equal control steps. The paper "
         "trains on 140. With 1440 there are about as many arms as the training has episodes.",
     )
@@ -54,6 +53,14 @@ def make_sizes(published: Published) -> Item:
     table = Table("Success on new arms", columns, "rrrrrc", tuple(rows), files)
     figure = Figure(draw_points(points, "training arms of each type", LABEL, LIMITS), "New arms, 1000 of each type.", files)
     return Item("New arms", "", (table,), (figure,), COMMANDS)
+
+
+def make_size_curves(published: Published) -> Item:
+    """Learning curves: new arms of the types trained on, and of the type left out."""
+    groups = published.runs_of(NAMES)
+    panels = ((SUCCESS, "New arms of the types trained on."), (LEFT_OUT, "The type left out, zero-shot."))
+    figures = [draw_groups(published, groups, column, caption, name=lambda config: config.name) for column, caption in panels]
+    return Item("Their training", figures=tuple(figure for figure in figures if figure), commands=COMMANDS[:2])
 
 
 def read_sizes(published: Published) -> Sequence[tuple[int, Evaluation, Config]]:
