@@ -51,7 +51,9 @@ def make_sizes(published: Published) -> Item:
             values.append((number, success))
     columns = ("arms of each type", "types trained on [%]", "type left out [%]", "seed", "control steps [M]", "policy")
     table = Table("Success on new arms", columns, "rrrrrc", tuple(rows), files)
-    figure = Figure(draw_points(points, "training arms of each type", LABEL, LIMITS), "New arms, 1000 of each type.", files)
+    counts = sorted({evaluation.trials * evaluation.robots_per_trial for _, evaluation, _ in found})
+    caption = f"New arms, {' or '.join(map(str, counts))} of each type."
+    figure = Figure(draw_points(points, "training arms of each type", LABEL, LIMITS), caption, files)
     return Item("New arms", "", (table,), (figure,), COMMANDS)
 
 

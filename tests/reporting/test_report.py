@@ -283,7 +283,7 @@ def test_success_stands_beside_the_number_of_training_robots_that_it_was_reached
     assert list(few.values()) == ["10", "40.00", "20.00 \N{PLUS-MINUS SIGN} 1.00", "0", "3.00", "reacher_pool_10_s0"]
     assert (more["arms of each type"], more["types trained on [%]"], more["type left out [%]"][:5]) == ("40", "85.00", "70.00")
     assert [alt.split(".")[0] for alt in tiny.pictures["pool_sizes"]] == [
-        "New arms: New arms, 1000 of each type",
+        "New arms: New arms, 100 of each type",
         "Their training: New arms of the types trained on",
     ]
 
