@@ -22,7 +22,7 @@ from hcp_jax.training.run_folder import (
     saved_robot_path,
 )
 
-_LINES = ("-", "--", ":", "-.")  # of curves of one colour, of which there are ten
+LINE_STYLES = ("-", "--", ":", "-.")  # of curves that would have the same colour
 _FILES = (CONFIG_FILE, ENVIRONMENT_FILE, TIMING_FILE, METRICS_FILE)  # of a run, the one last that makes it one to be found
 
 
@@ -107,12 +107,11 @@ def plot_groups(groups: Mapping[str, Sequence[pathlib.Path]], path: pathlib.Path
     panels = figure.subplots(1, len(columns), sharey=True, squeeze=False)[0]
     for column, axes in zip(columns, panels, strict=True):
         for number, (name, folders) in enumerate(groups.items()):
-            colour, style = f"C{number % 10}", _LINES[number // 10 % len(_LINES)]
+            colour, style = f"C{number % 10}", LINE_STYLES[number // 10 % len(LINE_STYLES)]
             curve = average_curves([read_curve(folder, column) for folder in folders])
             if curve is None:
                 continue  # an experiment without this column
-            seeds = f"{curve.num_seeds} seed{'s' * (curve.num_seeds > 1)}"
-            axes.plot(curve.steps / 1e6, curve.mean, style, color=colour, label=f"{name} ({seeds})")
+            axes.plot(curve.steps / 1e6, curve.mean, style, color=colour, label=f"{name} ({curve.seeds})")
             axes.fill_between(curve.steps / 1e6, curve.low, curve.high, color=colour, alpha=0.2, linewidth=0)
         axes.set_title(column.replace("_", " "))
         axes.set_xlabel("control steps [million]")

@@ -111,6 +111,11 @@ class SeedCurve:
     high: np.ndarray
     num_seeds: int
 
+    @property
+    def seeds(self) -> str:
+        """`1 seed`, `3 seeds`: for legends."""
+        return f"{self.num_seeds} seed{'s' * (self.num_seeds > 1)}"
+
 
 def average_curves(curves: Sequence[np.ndarray]) -> SeedCurve | None:
     """Curves of several seeds [E, 2] as one, as far as all of them go; None if one of them has no point."""

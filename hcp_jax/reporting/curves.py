@@ -98,7 +98,7 @@ def make_finetuning(published: Published, letter: str, name: str) -> Item:
         curve, is_pretrained = average_runs(runs, SUCCESS), bool(runs[0].config.init)
         if curve is not None:
             label = "from the policy that never saw the type" if is_pretrained else "from scratch"
-            lines.append(Line(f"{label} ({count_seeds(curve)})", "chain_fk" if is_pretrained else "none", curve))
+            lines.append(Line(f"{label} ({curve.seeds})", "chain_fk" if is_pretrained else "none", curve))
             shown += metrics_of(published, runs)
     files = tuple(shown)
     figures = (Figure(draw_curves(lines, LABEL, LIMITS), f"New arms of type {letter}.", files),) if lines else ()
@@ -141,13 +141,9 @@ def draw_groups(
     for label_of_runs, runs in zip(labels, groups, strict=True):
         curve = average_runs(runs, column)
         if curve is not None:
-            lines.append(Line(f"{label_of_runs} ({count_seeds(curve)})", runs[0].config.encoding, curve))
+            lines.append(Line(f"{label_of_runs} ({curve.seeds})", runs[0].config.encoding, curve))
             files += metrics_of(published, runs)
     return Figure(draw_curves(lines, label, limits), caption, tuple(files)) if lines else None
-
-
-def count_seeds(curve: SeedCurve) -> str:
-    return f"{curve.num_seeds} seed{'s' * (curve.num_seeds > 1)}"
 
 
 def metrics_of(published: Published, runs: Sequence[Run]) -> tuple[str, ...]:

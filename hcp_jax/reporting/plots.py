@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from hcp_jax.evaluation.publishing import LINE_STYLES
 from hcp_jax.evaluation.summary import SeedCurve
 
 # Colours that colour-blind readers can tell apart (Okabe and Ito), by what a policy sees.
@@ -30,7 +31,6 @@ COLOURS = {
 }
 _DISTINCT = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # of what does not differ in what it sees
 OTHER_COLOUR = "#777777"
-_LINES = ("-", "--", ":", "-.")  # of curves that would have the same colour
 _STYLE = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
@@ -91,7 +91,7 @@ def draw_curves(lines: Sequence[Line], label: str, limits: tuple[float, float] |
         drawn: list[str] = []
         for number, line in enumerate(lines):
             colour = _DISTINCT[number % len(_DISTINCT)] if is_same else COLOURS.get(line.encoding, OTHER_COLOUR)
-            style = _LINES[drawn.count(colour) % len(_LINES)]
+            style = LINE_STYLES[drawn.count(colour) % len(LINE_STYLES)]
             drawn.append(colour)
             curve = line.curve
             axes.plot(curve.steps / 1e6, curve.mean, style, color=colour, label=line.label)
