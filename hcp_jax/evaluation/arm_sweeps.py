@@ -7,7 +7,7 @@ import jax
 import numpy as np
 
 from hcp_jax.algorithms.ddpg import DDPGState
-from hcp_jax.config import ConfigError
+from hcp_jax.config import Config, ConfigError
 from hcp_jax.envs.goal_episodes import GoalEpisodes
 from hcp_jax.evaluation.new_robots import RangeChange, change_ranges, check_types, load_pool
 from hcp_jax.evaluation.records import QUANTILES
@@ -65,15 +65,21 @@ def evaluate_arms(
     record = describe_evaluation(run, folder, iteration, trials, robots_per_trial, ranges, pool_folder, seed, best)
     record |= {"types": {}, "robots": []}
     pools = choose_pools(run, trials * robots_per_trial, types, ranges, pool_folder, own_robots or {})
+    known = find_trained_on(run, config, own_robots or {})
     for name, pool in pools.items():
-        if own_robots:
-            zero_shot = not config.robot or describe_robot(own_robots[name]) != describe_robot(load_own_robot(config))
-        else:
-            zero_shot = name not in run.pool_config.types and name != own_robot_name(config)
         summary, rows = evaluate_type(run, state, name, pool, trials, robots_per_trial, seed)
-        record["types"][name] = {"zero_shot": zero_shot} | summary
+        record["types"][name] = {"zero_shot": name not in known} | summary
         record["robots"] += [{"type": name} | row for row in rows]
     return record
+
+
+def find_trained_on(run: ArmExperiment, config: Config, own_robots: Mapping[str, RobotFile]) -> set[str]:
+    """Names of robots that the run of `config` was trained on. An arm of `own_robots` is so by what its file says, whatever it
+    is called."""
+    if not own_robots:
+        return {*run.pool_config.types, own_robot_name(config)}
+    trained = describe_robot(load_own_robot(config)) if config.robot else None
+    return {name for name, robot in own_robots.items() if describe_robot(robot) == trained}
 
 
 def choose_pools(

@@ -70,7 +70,9 @@ def _check_record(record: dict) -> None:
     for name in _MEASURED:
         number(record[name])
     for outcome in record["types"].values():
-        number(outcome["success_mean"]), number(outcome["success_std"]), optional_number(outcome["reachable_success_mean"])
+        for name in ("success_mean", "success_std"):
+            number(outcome[name])
+        optional_number(outcome["reachable_success_mean"])
 
 
 def left_out_type(config: Config) -> str:
