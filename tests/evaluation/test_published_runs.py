@@ -67,3 +67,11 @@ def test_a_setting_that_differs_is_seen(experiments):
     values = to_dict(config)
     values["seed"], values["ddpg"]["tau"], values["total_env_steps"] = 5, 0.5, 1_000_000
     assert find_differences(config, from_dict(Config, values)) == {"ddpg.tau", "total_env_steps"}
+
+
+def test_each_experiment_of_table_1_has_a_link_by_its_number():
+    names = [config.name for config in load_configs(str(ROOT / "experiments" / "table1.py"))]
+    links = {f"exp{number:02d}_{('hcpe', 'ddpg')[(number - 1) % 2]}": f"{name}_s0" for number, name in enumerate(names, 1)}
+    policies = ROOT / "results" / "policies"
+    assert {path.name: path.readlink().name for path in policies.iterdir() if path.is_symlink()} == links
+    assert all((policies / target / "policy.msgpack").is_file() for target in links.values())
