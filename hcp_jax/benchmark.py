@@ -2,7 +2,7 @@
 
 import argparse
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 
 import jax
 from rich.table import Table
@@ -11,9 +11,10 @@ from hcp_jax import command_line, presets
 from hcp_jax.benchmarks.learner import benchmark_learner
 from hcp_jax.benchmarks.physics import ROWS, benchmark_physics
 from hcp_jax.benchmarks.scale import benchmark_scale
-from hcp_jax.benchmarks.training import TRAINING_ROWS, benchmark_training, time_to_success
+from hcp_jax.benchmarks.training import SUCCESS_ROWS, TRAINING_ROWS, benchmark_success, benchmark_training
 from hcp_jax.config import Config, ConfigError
 from hcp_jax.evaluation.files import write_json
+from hcp_jax.physics.build import resolve_physics
 from hcp_jax.training.run_folder import describe_environment
 
 SUBJECTS = ("physics", "learner", "train", "scale")
@@ -27,7 +28,7 @@ def main(arguments: list[str] | None = None) -> None:
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     parser.add_argument("subject", choices=SUBJECTS)
-    parser.add_argument("--config", help="experiment that is timed; default: the reacher of Exp. I")
+    parser.add_argument("--config", help="experiment that is timed; default: the reacher of Exp. I, in batches of 1,024")
     parser.add_argument(
         "--batches", type=int, nargs="+", default=[1, 128, 1120, 8960], help="of physics: numbers of environments"
     )
@@ -51,26 +52,29 @@ def main(arguments: list[str] | None = None) -> None:
             config = command_line.load_config(options.config, overrides)
         else:
             config = command_line.apply_overrides(presets.arm("reacher", "reacher", "chain_fk", left_out="H"), overrides)
+        if options.to_success is not None and options.subject != "train":
+            raise ConfigError(f"--to-success: goes with train, not {options.subject}")
+        allowed = ROWS_OF.get(options.subject, ()) if options.to_success is None else SUCCESS_ROWS
         for row in options.rows or ():
-            if row not in ROWS_OF.get(options.subject, ()):
-                allowed = ", ".join(ROWS_OF.get(options.subject, ())) or "none"
-                raise ConfigError(f"--rows={row}: expected of {options.subject}: {allowed}")
+            if row not in allowed:
+                subject = options.subject + (" --to-success" if options.to_success is not None else "")
+                raise ConfigError(f"--rows={row}: expected of {subject}: {', '.join(allowed) or 'none'}")
         if options.subject == "scale" and config.robot:
             raise ConfigError(f"robot={config.robot!r}: expected types of arms, or hoppers, for scale")
         if options.to_success is not None and config.task == "hopper":
             raise ConfigError("--to-success: the hopper has no success: expected a reacher or peg_insertion")
         command_line.enable_compilation_cache()
-        rows = []
+        environment, rows = describe_environment(resolve_physics(config.physics)), []
         for row in measure(options, config):
             rows.append(row)
             numbers = (f"{name} {format_number(value)}" for name, value in row.items() if isinstance(value, (int, float)))
             print(row["name"], *numbers, sep="  ", flush=True)
+            if options.json:  # what is measured stays, if a later row is broken off
+                write_json(options.json, {"environment": environment, "rows": rows})
         if options.subject == "physics":
             print_speeds(config.name, rows)
         else:
             print_rows(config.name, rows)
-        if options.json:
-            write_json(options.json, {"environment": describe_environment(config.physics), "rows": rows})
 
 
 def measure(options: argparse.Namespace, config: Config) -> Iterable[dict]:
@@ -81,16 +85,9 @@ def measure(options: argparse.Namespace, config: Config) -> Iterable[dict]:
         return benchmark_learner(config, options.seconds)
     if options.subject == "scale":
         return benchmark_scale(config, options.sizes, options.seconds)
-    rows = options.rows or list(TRAINING_ROWS)
     if options.to_success is None:
-        return benchmark_training(config, rows, options.seconds)
-    return times_to_success(options, config, rows)
-
-
-def times_to_success(options: argparse.Namespace, config: Config, rows: Sequence[str]) -> Iterator[dict]:
-    for name in rows:
-        if name in ("hcp_jax", "sb3-her"):
-            yield time_to_success(config, name, options.to_success, options.limit)
+        return benchmark_training(config, options.rows or list(TRAINING_ROWS), options.seconds)
+    return benchmark_success(config, options.rows or list(SUCCESS_ROWS), options.to_success, options.limit)
 
 
 def format_number(value: object) -> str:

@@ -123,7 +123,7 @@ def replicate(tree: Any) -> Any:
     """Puts every array, which all processes have, on every device."""
 
     def put(leaf: Any) -> jax.Array:
-        if isinstance(leaf, jax.Array) and jax.dtypes.issubdtype(leaf.dtype, jax.dtypes.prng_key):
+        if isinstance(leaf, jax.Array) and jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key):
             # As numbers, which processes can compare.
             return jax.random.wrap_key_data(put(jax.random.key_data(leaf)), impl=jax.random.key_impl(leaf))
         return jax.device_put(leaf, NamedSharding(get_mesh(), EVERYWHERE))

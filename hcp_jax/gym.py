@@ -30,8 +30,8 @@ def make_vector_env(config: Config, num_envs: int = 0, heldout: bool = False) ->
     experiment = make_experiment(config)
     pool = experiment.heldout_pool if heldout else experiment.train_pool
     env = experiment.make_env(pool)
-    make = PoolVectorEnv if isinstance(env, PoolEnv) else GoalVectorEnv
-    return make(env, num_envs or config.resolved_num_envs, experiment.robot_inputs(pool))
+    settings = (num_envs or config.resolved_num_envs, experiment.robot_inputs(pool))
+    return PoolVectorEnv(env, *settings) if isinstance(env, PoolEnv) else GoalVectorEnv(env, *settings)
 
 
 def make_env(config: Config, heldout: bool = False) -> SingleEnv:

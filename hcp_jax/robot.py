@@ -14,7 +14,7 @@ from hcp_jax.experiment.arm import make_train_arms
 from hcp_jax.hardware.arm_encodings import encode_arms
 from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES
 from hcp_jax.hardware.catalogue import catalogue_names, load_robot
-from hcp_jax.hardware.own_arm import compare_with, find_nearest, make_own_pool
+from hcp_jax.hardware.own_arm import SCALARS, compare_with, find_nearest, make_own_pool
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.robot_file import RobotFile
 from hcp_jax.training.run_folder import read_config
@@ -48,12 +48,11 @@ def main(arguments: list[str] | None = None) -> None:
 def describe(robot: RobotFile, own: RobotPool, trained: RobotPool) -> dict:
     """Joints, assumptions, v_h, and where the arm lies outside the training arms."""
     hardware, count = own.hardware, robot.chain.num_joints
-    columns = ("torque_limit", "link_mass", "damping", "frictionloss", "armature")
     joints = [
         {
             "name": name,
             "range": np.round(hardware["joint_range"][0, slot], 4).tolist(),
-            **{column: round(float(hardware[column][0, slot]), 5) for column in columns},
+            **{column: round(float(hardware[column][0, slot]), 5) for column in SCALARS},
         }
         for slot, name in enumerate(robot.joints)
     ]
@@ -77,7 +76,7 @@ def print_record(record: dict) -> None:
     for head in heads:
         table.add_column(head, justify="left" if head == "joint" else "right")
     for joint in record["joints"]:
-        numbers = (f"{joint[name]:g}" for name in ("torque_limit", "link_mass", "damping", "frictionloss", "armature"))
+        numbers = (f"{joint[name]:g}" for name in SCALARS)
         table.add_row(joint["name"], "{:.2f} to {:.2f}".format(*joint["range"]), *numbers)
     command_line.show(table)
     for note in record["notes"]:

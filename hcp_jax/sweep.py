@@ -1,18 +1,14 @@
 """`python -m hcp_jax.sweep experiments/LIST.py --seeds 3 [--out runs/LIST] [--ray ADDRESS] [--config.FIELD=VALUE ...]`"""
 
 import dataclasses
-import functools
 import pathlib
 import sys
 
 from hcp_jax import command_line
 from hcp_jax.config import Config, ConfigError, from_dict
-from hcp_jax.errors import NonFiniteError, PhysicsOverflowError, one_line
 from hcp_jax.evaluation.files import write_json
 from hcp_jax.evaluation.summary import summarise_runs
-from hcp_jax.ray_sweep import Job, run_on_ray
-from hcp_jax.training import loop, run_folder
-from hcp_jax.training.checkpoint import latest_iteration
+from hcp_jax.training import sweeping
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -47,72 +43,25 @@ def main(arguments: list[str] | None = None) -> None:
             for seed in range(known.seeds)
             for config in configs
         ]
-        check_jobs(jobs)
-        run_all = run_here if known.ray is None else functools.partial(run_there, address=known.ray, cpus=cpus)
-        if run_all(jobs):
+        sweeping.check_jobs(jobs)
+        runs = sweeping.run_here(jobs) if known.ray is None else sweeping.run_on_ray(jobs, run_in_worker, known.ray, cpus)
+        ended = []
+        for (_, folder), error in runs:
+            print(f"{folder}: {error or 'done'}", flush=True)
+            ended.append((folder, error))
+        failed = [str(folder) for folder, error in ended if error]
+        if failed:
+            print(f"{len(failed)} of {len(jobs)} runs failed: {', '.join(failed)}", file=sys.stderr)
+            sys.exit(command_line.BROKEN)
+        if len(ended) == len(jobs):
             write_json(known.summary or out / "summary.json", summarise_runs([folder for _, folder in jobs]))
-
-
-def check_jobs(jobs: list[Job]) -> None:
-    """Raises ConfigError or RunFolderError where two runs would share a folder, or a folder holds a run of other settings."""
-    folders = [folder for _, folder in jobs]
-    for config, folder in jobs:
-        if folders.count(folder) > 1:
-            raise ConfigError(f"name={config.name!r}: two experiments of the list have this name, and would share {folder}")
-        if (folder / run_folder.CONFIG_FILE).exists():
-            run_folder.check_resumable(folder, config)
-
-
-def run_here(jobs: list[Job]) -> bool:
-    """Runs one after the other. Returns whether all are done; False if the user interrupted one. Ends the command as
-    `run_there` does."""
-    failed = []
-    with loop.Interrupt().installed() as interrupt:
-        for config, folder in jobs:
-            try:
-                run_experiment(config, folder, interrupt)
-            except (PhysicsOverflowError, NonFiniteError) as error:
-                print(f"{folder}: {one_line(error)}", flush=True)
-                failed.append(folder)
-            if interrupt.requested:
-                return False
-    end_if_failed(failed, jobs)
-    return True
-
-
-def run_there(jobs: list[Job], address: str, cpus: int) -> bool:
-    """Runs on a Ray cluster. Ends the command with exit code 1 where some runs failed, after the others are done."""
-    failed = []
-    for (_, folder), error in run_on_ray(jobs, run_in_worker, address, cpus):
-        print(f"{folder}: {error or 'done'}", flush=True)
-        failed += [folder] if error else []
-    end_if_failed(failed, jobs)
-    return True
-
-
-def end_if_failed(failed: list[pathlib.Path], jobs: list[Job]) -> None:
-    """Ends the command with exit code 1 if there are failed runs."""
-    if failed:
-        print(f"{len(failed)} of {len(jobs)} runs failed: {', '.join(map(str, failed))}", file=sys.stderr)
-        sys.exit(command_line.BROKEN)
 
 
 def run_in_worker(config: dict, folder: str) -> None:
     """Raises RuntimeError if the run was interrupted: it is not done."""
     command_line.enable_compilation_cache()
-    if run_experiment(from_dict(Config, config), pathlib.Path(folder)):
+    if sweeping.run_experiment(from_dict(Config, config), pathlib.Path(folder)):
         raise RuntimeError("interrupted; saved")
-
-
-def run_experiment(config: Config, folder: pathlib.Path, interrupt: loop.Interrupt | None = None) -> bool:
-    """Trains, resumes or skips one experiment. Returns whether it was interrupted before its end."""
-    resume = (folder / run_folder.CONFIG_FILE).exists()
-    if resume:
-        iterations = latest_iteration(folder / run_folder.CHECKPOINT_FOLDER) or 0
-        if iterations * config.batch_size >= config.total_env_steps:
-            print(f"{folder}: done", flush=True)
-            return False
-    return loop.train(config, folder, resume, interrupt) is None
 
 
 if __name__ == "__main__":

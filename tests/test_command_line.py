@@ -10,7 +10,8 @@ import pytest
 
 from hcp_jax import benchmark, command_line, evaluate, sweep, train
 from hcp_jax.config import Config, ConfigError, field_names, from_dict, to_dict
-from hcp_jax.errors import PhysicsOverflowError
+from hcp_jax.errors import PhysicsOverflowError, one_line
+from hcp_jax.training import sweeping
 
 EXPERIMENTS = pathlib.Path(__file__).resolve().parents[1] / "experiments"
 HOPPER = str(EXPERIMENTS / "hopper_ppo.py")
@@ -235,19 +236,23 @@ def test_a_sweep_refuses_no_seeds_and_a_folder_of_another_setting(finished_run, 
     assert "two experiments of the list have this name" in fails(capsys, sweep.main, arguments)
 
 
-def test_a_run_that_breaks_does_not_keep_a_sweep_from_the_others(tiny_config, tmp_path, capsys, monkeypatch):
+@pytest.mark.parametrize("error", [PhysicsOverflowError(3), ConfigError("init=x: no such folder"), OSError("no space left")])
+def test_a_run_that_breaks_does_not_keep_a_sweep_from_the_others(error, tiny_config, tmp_path, capsys, monkeypatch):
     def run_experiment(config, folder, interrupt):
         if config.seed == 0:
-            raise PhysicsOverflowError(3)
-        folder.mkdir()
+            raise error
+        folder.mkdir(parents=True)
 
-    monkeypatch.setattr(sweep, "run_experiment", run_experiment)
-    jobs = [(dataclasses.replace(tiny_config, seed=seed), tmp_path / f"tiny_s{seed}") for seed in range(2)]
+    monkeypatch.setattr(sweeping, "run_experiment", run_experiment)
+    path = pathlib.Path(tiny_experiment(tmp_path, tiny_config))
+    path.write_text(path.read_text() + "def get_configs():\n    return [get_config()]\n")
     with pytest.raises(SystemExit) as exit_info:
-        sweep.run_here(jobs)
+        sweep.main([str(path), "--seeds", "2", "--out", str(tmp_path / "runs")])
     assert exit_info.value.code == 1
-    assert "1 of 2 runs failed" in capsys.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["tiny_s1"]
+    said = capsys.readouterr()
+    assert "1 of 2 runs failed" in said.err
+    assert f"tiny_s0: {one_line(error)}" in said.out
+    assert [path.name for path in (tmp_path / "runs").iterdir()] == ["tiny_s1"]
 
 
 def test_ctrl_c_in_a_runs_last_seconds_ends_the_sweep_after_it(tiny_config, tmp_path, monkeypatch):
@@ -257,9 +262,9 @@ def test_ctrl_c_in_a_runs_last_seconds_ends_the_sweep_after_it(tiny_config, tmp_
             signal.raise_signal(signal.SIGINT)  # too late for a checkpoint before the last
         return False
 
-    monkeypatch.setattr(sweep, "run_experiment", run_experiment)
+    monkeypatch.setattr(sweeping, "run_experiment", run_experiment)
     jobs = [(dataclasses.replace(tiny_config, seed=seed), tmp_path / f"tiny_s{seed}") for seed in range(2)]
-    assert not sweep.run_here(jobs)
+    assert not list(sweeping.run_here(jobs))
     assert [path.name for path in tmp_path.iterdir()] == ["tiny_s0"]
 
 
@@ -293,10 +298,11 @@ def test_a_seed_is_a_whole_number_that_a_key_takes(seed, capsys):
 def test_a_sweep_goes_on_with_a_run_that_lacks_its_last_checkpoint(finished_run, tiny_config, tmp_path, capsys):
     folder = shutil.copytree(finished_run, tmp_path / "tiny_s0")
     shutil.rmtree(folder / "checkpoints" / "newest" / "8")
-    sweep.run_experiment(tiny_config, folder)
+    assert not sweeping.run_experiment(tiny_config, folder)
     assert (folder / "checkpoints" / "newest" / "8").is_dir()
-    sweep.run_experiment(tiny_config, folder)
-    assert capsys.readouterr().out.endswith(f"{folder}: done\n")
+    assert capsys.readouterr().out
+    assert not sweeping.run_experiment(tiny_config, folder)
+    assert not capsys.readouterr().out, "it is done"
 
 
 @pytest.mark.parametrize(

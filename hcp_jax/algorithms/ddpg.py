@@ -183,7 +183,7 @@ class DDPG:
         if not self.config.normalize_inputs:
             return inputs
         seen = running_statistics.normalize(inputs, statistics, max_abs_value=5.0)
-        return jnp.where(statistics.std > MIN_STD, seen, 0.0)
+        return jnp.where(statistics.std > MIN_STD, seen, 0.0)  # pyright: ignore[reportOperatorIssue] (one array, not brax's Nest)
 
     def _train(self, state: DDPGState, num_iterations: jax.Array) -> DDPGState:
         return put_everywhere(jax.lax.fori_loop(0, num_iterations, lambda _, s: self._train_iteration(s), state))

@@ -185,7 +185,8 @@ class PPO:
             sums=zero_sums(),
         )
 
-    def _apply(self, network: dict, *inputs: jax.Array, method: str) -> Any:
+    def apply(self, network: dict, *inputs: jax.Array, method: str) -> Any:
+        """A method of the networks (`act`, `value`, `predict`) with the parameters `network`."""
         return self.network.apply(network, *inputs, method=method)
 
     def normalize(self, obs: jax.Array, statistics: running_statistics.RunningStatisticsState) -> jax.Array:
@@ -196,7 +197,7 @@ class PPO:
 
     def mean_action(self, network: dict, statistics, obs: jax.Array, v_h: jax.Array) -> jax.Array:
         """The deterministic policy: obs [B, O], v_h [B, K] -> action [B, A]."""
-        return self._apply(network, self.normalize(obs, statistics), v_h, method="act")[0]
+        return self.apply(network, self.normalize(obs, statistics), v_h, method="act")[0]
 
     def _train(self, state: PPOState, num_iterations: jax.Array) -> PPOState:
         state = jax.lax.fori_loop(0, num_iterations, lambda _, s: self._train_iteration(s), state)
@@ -240,7 +241,7 @@ class PPO:
         def loss(params: Params, minibatch: Batch, state: PPOState) -> tuple[jax.Array, dict]:
             ppo_loss, metrics = self._ppo_loss(params, minibatch, state)
             error = prediction_loss(
-                functools.partial(self._apply, params["network"], method="predict"),
+                functools.partial(self.apply, params["network"], method="predict"),
                 forward_model_variables(minibatch.obs, minibatch.next_obs),
                 state.model_statistics,
                 minibatch.executed_action,
@@ -277,7 +278,7 @@ class PPO:
         def step(env_state, key_action):
             v_h = self.visible(state, self.conditioning.v_h(state.params["embedding"], env_state.index))
             obs = self.normalize(env_state.obs, state.obs_statistics)
-            mean, log_std = self._apply(state.params["network"], obs, v_h, method="act")
+            mean, log_std = self.apply(state.params["network"], obs, v_h, method="act")
             action = sample_gaussian(mean, log_std, key_action)
             log_prob = gaussian_log_prob(mean, log_std, action)
             env_state, transition = self.env.step(env_state, action)
@@ -290,8 +291,8 @@ class PPO:
         v_h = self.visible(state, self.conditioning.v_h(state.params["embedding"], transitions.index))
         obs = self.normalize(transitions.obs, state.obs_statistics)
         next_obs = self.normalize(transitions.next_obs, state.obs_statistics)
-        value = self._apply(state.params["network"], obs, v_h, method="value")
-        next_value = self._apply(state.params["network"], next_obs, v_h, method="value")
+        value = self.apply(state.params["network"], obs, v_h, method="value")
+        next_value = self.apply(state.params["network"], next_obs, v_h, method="value")
         advantage, target = compute_gae(
             transitions.reward * config.reward_scale,
             value,
@@ -349,8 +350,8 @@ class PPO:
         config = self.config
         v_h = self.visible(state, self.conditioning.v_h(params["embedding"], batch.index))
         obs = self.normalize(batch.obs, state.obs_statistics)
-        mean, log_std = self._apply(params["network"], obs, v_h, method="act")
-        value = self._apply(params["network"], obs, v_h, method="value")
+        mean, log_std = self.apply(params["network"], obs, v_h, method="act")
+        value = self.apply(params["network"], obs, v_h, method="value")
         log_ratio = gaussian_log_prob(mean, log_std, batch.action) - batch.log_prob
         policy_loss = clipped_surrogate(log_ratio, batch.advantage, config.clip_eps)
         value_loss = clipped_value_loss(value, batch.value, batch.target, config.value_clip_eps)

@@ -29,6 +29,7 @@ from hcp_jax.experiment.build import make_experiment
 
 PEERS = {"hopper": ("sb3-ppo", "brax-ppo"), "reacher": ("sb3-her",), "peg_insertion": ("sb3-her",)}
 TRAINING_ROWS = ("hcp_jax", "sb3-ppo", "brax-ppo", "sb3-her")
+SUCCESS_ROWS = ("hcp_jax", "sb3-her")
 NUM_SUBPROCESSES = 8
 _SB3_UNROLL, _SB3_BATCH = 2048, 64  # Stable-Baselines3's defaults
 _BRAX_NUM_ENVS, _BRAX_UNROLL = 128, 32
@@ -47,7 +48,8 @@ def benchmark_training(config: Config, rows: Sequence[str], seconds: float) -> I
     Args:
         config: the experiment; peers get its robots, networks' widths and gradient samples per step, otherwise their defaults.
         rows: names out of `TRAINING_ROWS`; those of another task are left out.
-        seconds: shortest time of one measurement of ours; peers learn for at least that long.
+        seconds: shortest time of one measurement of ours; Stable-Baselines3 learns for at least that long, brax for three
+            iterations.
 
     Yields:
         name, task, samples_per_step, control_steps_per_second.
@@ -77,8 +79,8 @@ def check_installed(peers: Sequence[str]) -> None:
 
 def time_sb3_ppo(config: Config, seconds: float) -> float:
     """Control steps per second of Stable-Baselines3's PPO."""
-    from stable_baselines3 import PPO
-    from stable_baselines3.common.vec_env import SubprocVecEnv
+    from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
+    from stable_baselines3.common.vec_env import SubprocVecEnv  # pyright: ignore[reportMissingImports]
 
     worlds = SubprocVecEnv([lambda: gym.make_env(config)] * NUM_SUBPROCESSES, start_method="spawn")
     try:
@@ -108,7 +110,7 @@ def time_sb3_her(config: Config, seconds: float) -> float:
 
 def make_sb3_her(config: Config, equal_samples: bool):
     """A Stable-Baselines3 agent with our networks' widths: with our gradient samples per step, or with its own defaults."""
-    from stable_baselines3 import DDPG, HerReplayBuffer
+    from stable_baselines3 import DDPG, HerReplayBuffer  # pyright: ignore[reportMissingImports]
 
     env = gym.make_env(config)
     settings = {}
@@ -137,7 +139,7 @@ def time_learning(model, num_steps: int, seconds: float) -> float:
     return (model.num_timesteps - before) / elapsed
 
 
-def time_brax_ppo(config: Config, seconds: float) -> float:
+def time_brax_ppo(config: Config, _seconds: float) -> float:
     """Control steps per second of brax's PPO on its hopper, without compilation."""
     from brax import envs
     from brax.training.agents.ppo import train as ppo
@@ -157,23 +159,33 @@ def time_brax_ppo(config: Config, seconds: float) -> float:
         num_updates_per_batch=config.ppo.num_epochs,
         num_evals=4,
         run_evals=False,
-        progress_fn=lambda _, metrics: speeds.append(metrics["training/sps"]) if "training/sps" in metrics else None,
+        progress_fn=lambda _, metrics: speeds.append(float(metrics["training/sps"])) if "training/sps" in metrics else None,
     )
-    return float(speeds[-1])  # the first one compiles
+    return speeds[-1]  # the first one compiles
 
 
-def time_to_success(config: Config, name: str, target: float, limit: float) -> dict:
-    """Wall time until held-out robots of the training types succeed, everything included: compilation and evaluations.
+def benchmark_success(config: Config, rows: Sequence[str], target: float, limit: float) -> Iterator[dict]:
+    """Times training until held-out robots of the training types succeed, everything included: compilation and evaluations.
 
     Args:
         config: a goal task's experiment.
-        name: `hcp_jax`, or `sb3-her` with its defaults.
+        rows: names out of `SUCCESS_ROWS`, `sb3-her` with its defaults.
         target: success [%].
-        limit: seconds after which it is given up.
+        limit: seconds after which a row is given up.
 
-    Returns:
+    Yields:
         name, task, target, seconds, env_steps, success (the last one measured), reached.
+
+    Raises:
+        UserError: a peer is not installed; nothing was measured.
     """
+    check_installed(rows)
+    for name in rows:
+        yield time_to_success(config, name, target, limit)
+
+
+def time_to_success(config: Config, name: str, target: float, limit: float) -> dict:
+    """A row of `benchmark_success`."""
     start = time.perf_counter()
     learn = start_ours(config) if name == "hcp_jax" else start_sb3_her(config)
     env_steps, success = learn()
@@ -210,6 +222,7 @@ def start_sb3_her(config: Config, num_steps: int = 10_000) -> Callable[[], tuple
     model = make_sb3_her(config, equal_samples=False)
     of_training_types = dataclasses.replace(config, pool=dataclasses.replace(config.pool, left_out=()))
     worlds = gym.make_vector_env(of_training_types, heldout=True)
+    assert isinstance(worlds, gym.GoalVectorEnv)
 
     def learn() -> tuple[int, float]:
         model.learn(num_steps, reset_num_timesteps=False)

@@ -14,7 +14,11 @@ def to_dict(config) -> dict:
 
 
 def from_dict(cls, values: dict, path: str = ""):
-    """Builds dataclass `cls` from what `to_dict` gave. Raises ConfigError for unknown, missing or ill-typed fields."""
+    """Builds dataclass `cls` from what `to_dict` gave. Fields that are not given take their defaults.
+
+    Raises:
+        ConfigError: a field is unknown or ill-typed, or one without a default is missing.
+    """
     if not isinstance(values, dict):
         raise ConfigError(f"{path or cls.__name__}={values!r}: expected fields {', '.join(field_names(cls))}")
     hints = typing.get_type_hints(cls)

@@ -82,7 +82,7 @@ class _Graph:
         if name not in _TRANSLATIONS:
             raise OnnxError(f"the JAX primitive {name} has no translation to ONNX")
         results = _TRANSLATIONS[name](self, eqn, *names)
-        return [results] if isinstance(results, str) else results
+        return [results] if isinstance(results, str) else list(results)
 
     def add(self, operator: str, *inputs: str, **attributes) -> str:
         """A node with one output; its name."""

@@ -5,7 +5,7 @@ one's last is `info["final_obs"]`. `info["robot_id"]` is the robot of each world
 """
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import gymnasium
 import jax
@@ -21,18 +21,19 @@ from hcp_jax.physics.base import select_rows
 
 # (index [B], obs [B, O]) -> what an agent sees of the robots and their state [B, K], the observation first.
 RobotInputs = Callable[[jax.Array, jax.Array], jax.Array]
+Env = TypeVar("Env", bound=PoolEnv | GoalEnv)
 
 
 def unbounded(size: int) -> gymnasium.spaces.Box:
     return gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
 
 
-class _VectorEnv(gymnasium.vector.VectorEnv):
+class _VectorEnv(gymnasium.vector.VectorEnv, Generic[Env]):
     """What both kinds of worlds share: spaces, seeds, and dressing steps as Gymnasium wants them."""
 
     metadata: ClassVar[dict[str, Any]] = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
 
-    def __init__(self, env: PoolEnv | GoalEnv, num_envs: int, robot_inputs: RobotInputs):
+    def __init__(self, env: Env, num_envs: int, robot_inputs: RobotInputs):
         """Args:
         env: the environment of a pool.
         num_envs: worlds, each with its own robot.
@@ -90,7 +91,7 @@ class _VectorEnv(gymnasium.vector.VectorEnv):
         return obs, reward.astype(np.float64), terminated, truncated, infos
 
 
-class PoolVectorEnv(_VectorEnv):
+class PoolVectorEnv(_VectorEnv[PoolEnv]):
     """A pool's worlds (`PoolEnv`): a robot drawn anew for each episode, its v_h in the observation."""
 
     def _make_observation_space(self, size: int) -> gymnasium.Space:
@@ -125,7 +126,7 @@ class GoalWorlds:
         return self.goal.index
 
 
-class GoalVectorEnv(_VectorEnv):
+class GoalVectorEnv(_VectorEnv[GoalEnv]):
     """A goal task's worlds (`GoalEnv`), observed as Gymnasium-Robotics does: `observation`, `achieved_goal`, `desired_goal`.
 
     Episodes end at success or diverged physics (terminated) or after their length (truncated); each restarts by itself.

@@ -33,13 +33,18 @@ def make_catalogue_table(
         in percent.
 
     Raises:
-        ConfigError: a policy is of hoppers, an arm is not in the catalogue, a run was not trained on one of `names`, or two
-            runs were on the same.
+        ConfigError: a policy is of hoppers or of another task than the first, an arm is not in the catalogue, a run was not
+            trained on one of `names`, or two runs were on the same.
         RunFolderError, CheckpointError: a policy cannot be read.
     """
-    for policy in policies:
-        if read_config(policy).task == "hopper":
+    tasks = [read_config(policy).task for policy in (*policies, *fine_tuned)]
+    for policy, task in zip((*policies, *fine_tuned), tasks, strict=True):
+        if task == "hopper":
             raise ConfigError(f"{policy}: a policy of hoppers; expected one of arms")
+        if task != tasks[0]:
+            raise ConfigError(
+                f"{policy}: of {task}, and {policies[0]} is of {tasks[0]}; expected one task, with the same goals"
+            )
     names = sorted(names or catalogue_names())
     for name in names:
         if name not in catalogue_names():

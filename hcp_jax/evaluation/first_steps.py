@@ -62,13 +62,15 @@ def act(ppo: PPO, env: PoolEnv, state: PPOState, num_steps: int, key: jax.Array)
         The forward model's variables [T, N, 2 O] and the executed actions [T, N, A].
     """
     assert state.reserve is not None
+    statistics = state.reserve.obs_statistics
     network, index = put_actor(state.reserve, state.params["network"]), jnp.arange(env.num_robots)
     blind = jnp.zeros((env.num_robots, ppo.conditioning.size))
 
     def step(env_state, key):
         key_action, key_reset = jax.random.split(key)
-        obs = ppo.normalize(env_state.obs, state.reserve.obs_statistics)
-        action = sample_gaussian(*ppo.network.apply(network, obs, blind, method="act"), key_action)
+        obs = ppo.normalize(env_state.obs, statistics)
+        mean, log_std = ppo.apply(network, obs, blind, method="act")
+        action = sample_gaussian(mean, log_std, key_action)
         env_state, transition = env.step_without_reset(env_state, action)
         env_state = env.restart(env_state, transition.done, key_reset, index)
         return env_state, (forward_model_variables(transition.obs, transition.next_obs), transition.action)
@@ -82,7 +84,7 @@ def fit_v_h(ppo: PPO, state: PPOState, variables: jax.Array, actions: jax.Array,
     num_steps, num_robots = actions.shape[:2]
 
     def predict(obs: jax.Array, action: jax.Array, v_h: jax.Array) -> jax.Array:
-        return ppo.network.apply(state.params["network"], obs, action, v_h, method="predict")
+        return ppo.apply(state.params["network"], obs, action, v_h, method="predict")
 
     def loss(v_h: jax.Array, variables: jax.Array, actions: jax.Array) -> jax.Array:
         """Of one robot: its v_h [K] and what it did, [B, 2 O] and [B, A]."""
@@ -97,7 +99,7 @@ def fit_v_h(ppo: PPO, state: PPOState, variables: jax.Array, actions: jax.Array,
         rows = jax.random.choice(key, num_steps, (min(num_steps, STEPS_PER_UPDATE),), replace=False)
         grads = jax.vmap(jax.grad(loss), in_axes=(0, 1, 1))(v_h, variables[rows], actions[rows])
         updates, opt_state = optimizer.update(grads, opt_state)
-        return (optax.apply_updates(v_h, updates), opt_state), None
+        return (v_h + updates, opt_state), None
 
     start = jnp.zeros((num_robots, ppo.conditioning.size))
     (v_h, _), _ = jax.lax.scan(update, (start, optimizer.init(start)), jax.random.split(key, UPDATES))

@@ -97,6 +97,7 @@ class Evaluation:
     policy: str
     task: str
     encoding: str
+    env_steps: int
     trials: int
     robots_per_trial: int
     ranges: Mapping[str, tuple[float, float]]
@@ -112,6 +113,7 @@ def read_evaluation(path: pathlib.Path) -> Evaluation:
             policy=pathlib.PurePath(record["run"]).name,
             task=str(record["task"]),
             encoding=str(record["encoding"]),
+            env_steps=int(record["checkpoint_env_steps"]),
             trials=int(record["trials"]),
             robots_per_trial=int(record["robots_per_trial"]),
             ranges={name: (number(low), number(high)) for name, (low, high) in record["ranges"].items()},

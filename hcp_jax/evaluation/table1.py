@@ -24,7 +24,8 @@ PAPER = {
 }
 
 
-_MEASURED = ("checkpoint_env_steps", "trials", "robots_per_trial")  # what evaluations of one row have in common
+# What evaluations of one row have in common.
+_MEASURED = ("checkpoint_env_steps", "trials", "robots_per_trial", "physics", "integrator")
 
 Runs = Sequence[tuple[str, dict, Config]]  # of one experiment: policy, record and config of each seed (`group_evaluations`)
 
@@ -68,7 +69,11 @@ def group_evaluations(results: pathlib.Path) -> Sequence[Runs]:
 def _check_record(record: dict) -> None:
     """Raises KeyError, TypeError or ValueError unless an evaluation's record has what tables are made of."""
     for name in _MEASURED:
-        number(record[name])
+        if not isinstance(record[name], str):
+            number(record[name])
+    for name in ("ranges", "pool", "best"):
+        if record.get(name):  # older records do not have all three
+            raise ValueError(f"{name}={record[name]!r}: expected the newest checkpoint on arms of the training's ranges")
     for outcome in record["types"].values():
         for name in ("success_mean", "success_std"):
             number(outcome[name])

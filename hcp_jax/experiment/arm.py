@@ -24,7 +24,8 @@ from hcp_jax.hardware.catalogue import load_robot
 from hcp_jax.hardware.own_arm import make_own_pool, make_own_variants
 from hcp_jax.hardware.pool import RobotPool
 from hcp_jax.hardware.robot_file import RobotFile
-from hcp_jax.physics.base import chosen_integrator, make_physics
+from hcp_jax.physics.base import chosen_integrator
+from hcp_jax.physics.build import make_physics
 from hcp_jax.policies.conditioning import Embedding
 from hcp_jax.policies.goal_conditioning import GoalConditioning
 

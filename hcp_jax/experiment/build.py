@@ -6,7 +6,7 @@ from hcp_jax.config import ArmPoolConfig, Config
 from hcp_jax.config.arm import OWN_ARM_CONDITIONINGS
 from hcp_jax.experiment.arm import ArmExperiment, make_arm_experiment
 from hcp_jax.experiment.hopper import HopperExperiment, make_hopper_experiment
-from hcp_jax.physics.base import default_physics
+from hcp_jax.physics.build import resolve_physics
 
 
 def make_experiment(config: Config, physics: str = "auto") -> ArmExperiment | HopperExperiment:
@@ -17,7 +17,7 @@ def make_experiment(config: Config, physics: str = "auto") -> ArmExperiment | Ho
         physics: engine, may be `native-INTEGRATOR`; `auto` takes the config's.
     """
     physics = config.physics if physics == "auto" else physics
-    physics = default_physics() if physics == "auto" else physics
+    physics = resolve_physics(physics)
     make = make_hopper_experiment if config.task == "hopper" else make_arm_experiment
     return make(config, physics)
 

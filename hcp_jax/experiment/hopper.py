@@ -19,7 +19,7 @@ from hcp_jax.experiment.base import EVALUATION_SEED, FIT, TRAIN
 from hcp_jax.hardware.encodings import encode
 from hcp_jax.hardware.hopper import make_hopper_pool
 from hcp_jax.hardware.pool import RobotPool, concatenate_pools
-from hcp_jax.physics.base import make_physics
+from hcp_jax.physics.build import make_physics
 from hcp_jax.policies.conditioning import Conditioning, Embedding, Encoding
 
 
@@ -45,7 +45,7 @@ class HopperExperiment:
     @property
     def num_evaluated(self) -> int:
         """Robots of each kind in an evaluation."""
-        return min(self.config.eval_robots, self.train_pool.num_robots, self.heldout_pool.num_robots)
+        return self.evaluator.env.num_robots // 2
 
     def robot_inputs(self, pool: RobotPool) -> Callable[[jax.Array, jax.Array], jax.Array]:
         table = jnp.asarray(encode(pool, self.config.encoding, self.train_pool))
@@ -118,8 +118,7 @@ def make_hopper_experiment(config: Config, physics: str) -> HopperExperiment:
         num_iterations,
         train_forward_model=not config.init,
     )
-    num_evaluated = min(config.eval_robots, train_pool.num_robots, heldout_pool.num_robots)
-    rows = np.arange(num_evaluated)
+    rows = np.arange(min(config.eval_robots, train_pool.num_robots, heldout_pool.num_robots))
     evaluation_pool = concatenate_pools(train_pool.subset(rows), heldout_pool.subset(rows))
     evaluator = make_evaluator(ppo, make_env(evaluation_pool))
     run = HopperExperiment(config, physics, train_pool, heldout_pool, ppo, make_env, evaluator, num_iterations)

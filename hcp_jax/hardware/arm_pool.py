@@ -11,7 +11,7 @@ import numpy as np
 
 from hcp_jax.hardware.arm import ALL_TYPES, CHAIN_TYPES, arm_spec, sample_hardware
 from hcp_jax.hardware.chain import MAX_JOINTS, Chain, edit_spec, read_chain
-from hcp_jax.hardware.pool import RobotPool, repeat_poses, robots_path, stack_models
+from hcp_jax.hardware.pool import PoolError, RobotPool, repeat_poses, robots_path, stack_models
 from hcp_jax.hardware.random_chain import sample_reaching_chains
 from hcp_jax.hardware.ranges import SPLIT_STRIDE, SPLITS, TYPE_STRIDE, ArmRanges, ChainRanges
 from hcp_jax.hardware.start_poses import start_angles
@@ -31,7 +31,13 @@ def make_arm_pool(
     chain_ranges: ChainRanges | None = None,
 ) -> RobotPool:
     """Samples, compiles and stacks `num_per_type` arms of each of `types`, in that order: random chains from `chain_ranges` (by
-    default `ChainRanges()`), the others from `ranges`."""
+    default `ChainRanges()`), the others from `ranges`.
+
+    Raises:
+        PoolError: more robots of a type than there are ids.
+    """
+    if num_per_type > TYPE_STRIDE:
+        raise PoolError(f"{num_per_type:,} arms of each type: expected at most {TYPE_STRIDE:,}, or two would share an id")
     chains, ids, numbers, starts = [], [], [], []
     for robot_type in types:
         number = ALL_TYPES.index(robot_type)

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 MAX_JOINTS = 7
+GRAVITY = 9.81  # [m/s^2] of all our models, along -z
 TIP_SITE = "ref_pt"
 # [kg m^2] of a padded slot. In 1 s of hard contact it turns by less than 2e-5 rad; at 1e6 the solver's tolerance, which goes
 # by the mean inertia, is so loose that the other joints are off by 4e-4 rad.
@@ -56,15 +57,20 @@ class Chain:
         return len(self.mass)
 
     def is_consistent(self) -> bool:
-        """Whether every field is finite and has a row for each joint."""
+        """Whether every field is finite and has a row for each joint, and masses, inertias and ranges are possible."""
         n = self.num_joints
         widths = {"com": (3,), "inertia_quat": (4,), "inertia": (3,), "joint_range": (2,)}
         shapes = {field.name: (n, *widths.get(field.name, ())) for field in dataclasses.fields(self)}
         shapes |= {"pos": (n + 1, 3), "quat": (n + 1, 4)}
         values = {name: getattr(self, name) for name in shapes}
-        return 1 <= n <= MAX_JOINTS and all(
+        if not 1 <= n <= MAX_JOINTS or not all(
             values[name].shape == shape and np.isfinite(values[name]).all() for name, shape in shapes.items()
-        )
+        ):
+            return False
+        is_body = (self.mass > 0).all() and (self.inertia > 0).all()
+        is_body = is_body and (2 * self.inertia.max(axis=1) <= self.inertia.sum(axis=1)).all()  # A + B >= C
+        never_negative = (self.damping, self.frictionloss, self.armature, self.torque_limit)
+        return bool(is_body and (np.diff(self.joint_range) > 0).all() and all((values >= 0).all() for values in never_negative))
 
     def padded(self, name: str) -> np.ndarray:
         """Field `name` with zeros for missing joints: [7, ...]. Quaternions are padded with the identity."""
@@ -207,9 +213,11 @@ def _composite_inertia(model: mujoco.MjModel, data: mujoco.MjData, bodies: list[
     position, rotation = frame
     moments, axes = np.linalg.eigh(rotation.T @ tensor @ rotation)
     order = np.argsort(-moments)  # MuJoCo's order
-    axes = axes[:, order]
+    axes, moments = axes[:, order], moments[order]
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
-    return mass, rotation.T @ (com - position), _quat_of(axes), moments[order]
+    # Of flat bodies the largest moment is the sum of the others, and MuJoCo takes one that rounding leaves above it for wrong.
+    moments[0] = min(moments[0], (moments[1] + moments[2]) * (1.0 - 1e-12))
+    return mass, rotation.T @ (com - position), _quat_of(axes), moments
 
 
 def _frame_along(rotation: np.ndarray, axis: np.ndarray) -> np.ndarray:

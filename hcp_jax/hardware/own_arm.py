@@ -5,6 +5,7 @@ import itertools
 
 import numpy as np
 
+from hcp_jax.errors import one_line
 from hcp_jax.hardware.arm import ALL_TYPES, sample_hardware
 from hcp_jax.hardware.arm_encodings import encode_arms
 from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES, make_chain_pool
@@ -72,9 +73,13 @@ def make_own_variants(task: str, robot: RobotFile, ranges: ArmRanges, count: int
 
 
 def _make_pool(task: str, chains: list[Chain], start_angles: np.ndarray) -> RobotPool:
+    """Raises RobotFileError where MuJoCo refuses an arm."""
     count = len(chains)
     starts = np.tile(start_angles, (count, 1, 1))
-    return make_chain_pool(CHAIN_TEMPLATES[task], chains, OWN_ID + np.arange(count), np.full(count, -1), starts)
+    try:
+        return make_chain_pool(CHAIN_TEMPLATES[task], chains, OWN_ID + np.arange(count), np.full(count, -1), starts)
+    except ValueError as error:
+        raise RobotFileError(one_line(error)) from error
 
 
 def compare_with(own: RobotPool, trained: RobotPool) -> list[Entry]:

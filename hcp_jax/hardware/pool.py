@@ -68,7 +68,7 @@ class RobotPool:
     Attributes:
         template: MJCF text that every robot was compiled from.
         fields: MjModel fields that differ between robots, by name: [N, ...] float64.
-        hardware: sampled and derived parameters in SI units, by name: [N, K] float64.
+        hardware: sampled and derived parameters in SI units, by name: [N, ...] float64 (of arms: `make_chain_pool`).
         robot_id: [N] int32, a robot's number in the pool it was made in.
     """
 
@@ -138,7 +138,7 @@ class RobotPool:
                         group, name = key.split("/", 1)
                         groups[group][name] = arrays[key]
                 return cls((folder / "template.xml").read_text(), groups["fields"], groups["hardware"], arrays["robot_id"])
-        except (OSError, KeyError, ValueError) as error:
+        except (OSError, KeyError, ValueError, TypeError, AttributeError) as error:
             if isinstance(error, PoolError):
                 raise
             raise PoolError(f"{folder}: not a robot pool ({error})") from error

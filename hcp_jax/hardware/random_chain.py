@@ -6,12 +6,11 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from hcp_jax.hardware.chain import MAX_JOINTS, Chain
+from hcp_jax.hardware.chain import GRAVITY, MAX_JOINTS, Chain
 from hcp_jax.hardware.ranges import ChainRanges, RangeError, sample_logarithmic, sample_uniform
 from hcp_jax.hardware.reaching import MAX_ERROR, come_near, reach_points
 from hcp_jax.hardware.start_poses import GRID, REACHER_GOALS
 
-GRAVITY = 9.81  # [m/s^2]
 _SHORTEST = 0.05  # link that has a length, as a share of the longest
 _TURN = np.pi / 2
 MIN_JOINTS = 3  # that reach points in a volume, all links needed

@@ -15,9 +15,20 @@ SPLIT_STRIDE = 1_000_000
 TYPE_STRIDE = 10_000  # between robot ids of two types of arms
 
 
-# [m] The most that a range may take off a link. A link that is shorter than what is taken off turns round (arm.json says
-# by how much each may change: none does).
-SHORTEST_LINK_CHANGE = -0.25
+# [m] of the nominal arm (arm.json): where a link's change of length puts the next body. A link that more is taken off turns
+# round.
+LINK_LENGTHS = {
+    "l0": 0.237,
+    "l1_1": 0.1336,
+    "l1_2": 0.14,
+    "l2": 0.263,
+    "l3_1": 0.1265,
+    "l3_2": 0.1265,
+    "l4": 0.275,
+    "l5_1": 0.0958,
+    "l5_2": 0.076,
+    "l6": 0.0488,
+}
 
 
 class RangeError(UserError):
@@ -108,7 +119,7 @@ class ArmRanges:
 
     def __post_init__(self):
         for field in dataclasses.fields(self):
-            minimum = SHORTEST_LINK_CHANGE if field.name.startswith("l") else 1e-3 if field.name == "mass_ratio" else 0.0
+            minimum = -LINK_LENGTHS[field.name] if field.name in LINK_LENGTHS else 1e-3 if field.name == "mass_ratio" else 0.0
             check_range(f"ranges.{field.name}", getattr(self, field.name), minimum)
 
 
@@ -201,8 +212,7 @@ class ChainRanges:
 
 def nominal_lengths(ranges: ArmRanges) -> ArmRanges:
     """`ranges` for arms that differ in dynamics alone (paper, appendix, "Effect of Dynamics")."""
-    links = [field.name for field in dataclasses.fields(ranges) if field.name.startswith("l")]
-    return dataclasses.replace(ranges, **dict.fromkeys(links, (0.0, 0.0)))
+    return dataclasses.replace(ranges, **dict.fromkeys(LINK_LENGTHS, (0.0, 0.0)))
 
 
 def torso_mass_only() -> HopperRanges:

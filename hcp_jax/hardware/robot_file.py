@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from hcp_jax.errors import one_line
-from hcp_jax.hardware.chain import MAX_JOINTS, Chain, read_chain
+from hcp_jax.hardware.chain import GRAVITY, MAX_JOINTS, Chain, read_chain
 from hcp_jax.hardware.robot_formats import RobotFileError, load_robot_spec
 
 MAX_SECONDS = 9.0
@@ -24,7 +24,6 @@ MAX_SECONDS = 9.0
 # [kg m^2]. A geared joint has both: without them a light wrist accelerates by 1000 rad/s^2, and 4 ms steps diverge.
 ASSUMED_TORQUE_LIMITS = (80.0, 80.0, 40.0, 40.0, 9.0, 9.0, 9.0)
 ASSUMED_DAMPING, ASSUMED_ARMATURE = 1.0, 0.1
-GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] of all our models
 _TIP_SITE = "hcp_jax tip"  # a name that no file has
 _MIN_INERTIA = 1e-12  # [kg], [kg m^2]
 
@@ -68,7 +67,8 @@ def read_robot(path: str | pathlib.Path, base: str | None = None, tip: str | Non
     try:
         answer = json.loads(done.stdout.strip().splitlines()[-1])
     except (IndexError, ValueError):
-        raise RobotFileError(f"{path}: MuJoCo ended without an answer (exit code {done.returncode})") from None
+        why = "".join(f": {line.strip()}" for line in done.stderr.strip().splitlines()[-1:])
+        raise RobotFileError(f"{path}: reading it ended without an answer (exit code {done.returncode}){why}") from None
     if "error" in answer:
         raise RobotFileError(f"{path}: {answer['error']}")
     return parse_robot(answer)
@@ -114,20 +114,20 @@ def read_robot_here(path: pathlib.Path, base: str | None, tip: str | None) -> Ro
     notes: list[str] = []
     spec, moved_by = load_robot_spec(path, notes)
     name_all(spec)
-    names = [body.name for body in spec.bodies]
+    links = [body.name for body in spec.bodies[1:]]
     for role, name in (("base", base), ("tip", tip)):
-        if name is not None and name not in names:
-            raise RobotFileError(f"--{role}={name}: no such link; there are {', '.join(names[1:])}")
+        if name is not None and name not in links:
+            raise RobotFileError(f"--{role}={name}: no such link; there are {', '.join(links)}")
     remove_all_but_bodies(spec)
     tip_body = spec.body(tip) if tip else find_tip(spec)
-    path_bodies = bodies_towards(spec, tip_body)
+    path_bodies = bodies_towards(tip_body)
     base_body = spec.body(base) if base else path_bodies[0]
     if base_body not in path_bodies:
         raise RobotFileError(f"--base={base}: not between the root and {tip_body.name}")
     moving = path_bodies[path_bodies.index(base_body) + (1 if base else 0) :]
     fix_joints(spec, moving, notes)
     check_joints(moving, moved_by)
-    check_masses(spec, moving)
+    check_masses(moving)
     note_other_forces(spec, moving, notes)
     tip_body.add_site(name=_TIP_SITE)
     try:
@@ -173,7 +173,7 @@ def find_tip(spec: mujoco.MjSpec) -> mujoco.MjsBody:
     """
     parents = {body.name: body.parent.name if body.parent else None for body in spec.bodies}
     leaves = [body for body in spec.bodies[1:] if body.name not in parents.values()]
-    hinges = {leaf.name: hinge_names(bodies_towards(spec, leaf)) for leaf in leaves}
+    hinges = {leaf.name: hinge_names(bodies_towards(leaf)) for leaf in leaves}
     longest = max(hinges.values(), key=len, default=())
     if not longest:
         raise RobotFileError("has no hinge joints")
@@ -181,7 +181,7 @@ def find_tip(spec: mujoco.MjSpec) -> mujoco.MjsBody:
         if chain != longest[: len(chain)]:
             other = next(leaf for leaf, names in hinges.items() if names == longest)
             raise RobotFileError(f"branches: to {other} and to {name}; choose one end with --tip")
-    ends = [bodies_towards(spec, leaf) for leaf in leaves if hinges[leaf.name] == longest]
+    ends = [bodies_towards(leaf) for leaf in leaves if hinges[leaf.name] == longest]
     common = [bodies[0] for bodies in zip(*ends, strict=False) if all(body.name == bodies[0].name for body in bodies)]
     return common[-1]
 
@@ -190,7 +190,7 @@ def hinge_names(bodies: list[mujoco.MjsBody]) -> tuple[str, ...]:
     return tuple(j.name for body in bodies for j in body.joints if j.type == mujoco.mjtJoint.mjJNT_HINGE)
 
 
-def bodies_towards(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> list[mujoco.MjsBody]:
+def bodies_towards(body: mujoco.MjsBody) -> list[mujoco.MjsBody]:
     """From the first body in the world to `body`."""
     bodies = []
     while body.parent is not None:
@@ -228,7 +228,7 @@ def check_joints(moving: list[mujoco.MjsBody], moved_by: Mapping[str, str]) -> N
         raise RobotFileError(f"{count} hinges between base and tip: expected 1 to {MAX_JOINTS}")
 
 
-def check_masses(spec: mujoco.MjSpec, moving: list[mujoco.MjsBody]) -> None:
+def check_masses(moving: list[mujoco.MjsBody]) -> None:
     """Raises RobotFileError for a moving link that weighs nothing."""
     for body in moving:
         if body.joints and not body.geoms and (body.mass < _MIN_INERTIA or not body.explicitinertial):
@@ -243,9 +243,9 @@ def note_other_forces(spec: mujoco.MjSpec, moving: list[mujoco.MjsBody], notes: 
         notes.append(f"springs of joints left out: {', '.join(sprung)}")
     if floating:
         notes.append(f"gravity compensation of links left out: {', '.join(floating)}")
-    if not np.allclose(spec.option.gravity, GRAVITY):
+    if not np.allclose(spec.option.gravity, (0.0, 0.0, -GRAVITY)):
         gravity = " ".join(f"{value:g}" for value in spec.option.gravity)
-        notes.append(f"gravity of the file left out: {gravity}; policies were trained with {GRAVITY[2]:g} along z")
+        notes.append(f"gravity of the file left out: {gravity}; policies were trained with {-GRAVITY:g} along z")
 
 
 def check_chain(chain: Chain, model: mujoco.MjModel, joints: list, notes: list[str]) -> Chain:

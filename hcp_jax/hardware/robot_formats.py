@@ -6,10 +6,12 @@ import xml.etree.ElementTree as ElementTree
 from xml.parsers import expat
 
 import mujoco
+import numpy as np
 
 from hcp_jax.errors import UserError, one_line
 
 MAX_BYTES = 20_000_000
+MAX_ROUNDING = 0.01  # share of a link's largest moment of inertia that digits left out may have made too much of it
 
 
 class RobotFileError(UserError):
@@ -63,10 +65,13 @@ def load_robot_spec(path: pathlib.Path, notes: list[str]) -> tuple[mujoco.MjSpec
         mimics = {
             joint.get("name", ""): mimic.get("joint", "") for joint in root.iter("joint") for mimic in joint.iter("mimic")
         }
-        return load_urdf(root), mimics
+        spec = load_urdf(root)
+        relax_inertias(spec, notes)
+        return spec, mimics
     if root.tag != "mujoco":
         raise RobotFileError(f"starts with <{root.tag}>: expected <robot> (URDF) or <mujoco> (MJCF)")
     spec = load_mjcf(path, root, notes)
+    relax_inertias(spec, notes)
     joint_constraints = [equality for equality in spec.equalities if equality.type == mujoco.mjtEq.mjEQ_JOINT]
     return spec, {equality.name1: equality.name2 or "a constant" for equality in joint_constraints}
 
@@ -136,6 +141,39 @@ def load_mjcf(path: pathlib.Path, root: ElementTree.Element, notes: list[str]) -
     if missing:
         notes.append(f"meshes that are missing: {', '.join(sorted(missing))}")
     return spec
+
+
+def relax_inertias(spec: mujoco.MjSpec, notes: list[str]) -> None:
+    """Lowers the largest moment of inertia of links where it is above the sum of the others by no more than rounding does.
+
+    No body has such moments, and MuJoCo refuses them. A flat link's are at that limit, and the digits of a file, or of turning
+    its axes, leave them on either side of it.
+    """
+    for body in spec.bodies[1:]:
+        if not body.explicitinertial:
+            continue
+        is_full = bool(np.isfinite(body.fullinertia[0]))
+        if is_full:
+            xx, yy, zz, xy, xz, yz = body.fullinertia
+            moments, axes = np.linalg.eigh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        else:
+            moments, axes = np.array(body.inertia), np.eye(3)
+        largest = int(np.argmax(moments))
+        others = float(moments.sum() - moments[largest])
+        excess = float(moments[largest] - others)
+        if not -1e-12 * others < excess <= MAX_ROUNDING * moments[largest]:
+            continue
+        if excess > 1e-6 * others:
+            share = 100.0 * excess / float(moments[largest])
+            notes.append(
+                f"inertia of link {body.name} lowered by {share:.2g} %: it was above what a body can have (A + B >= C)"
+            )
+        moments[largest] = others * (1.0 - 1e-9)
+        if is_full:
+            tensor = axes @ np.diag(moments) @ axes.T
+            body.fullinertia = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        else:
+            body.inertia = moments
 
 
 def check_references(folder: pathlib.Path, where: pathlib.Path, root: ElementTree.Element, seen: set[pathlib.Path]) -> None:

@@ -1,4 +1,4 @@
-"""The physics interface and the choice of an engine.
+"""The physics interface.
 
 A physics engine advances B worlds, each holding one robot of a pool, under controls held for a number of substeps. Its whole
 state is `PhysicsState`; it keeps nothing between calls, so a rollout can be checkpointed, replayed and moved.
@@ -62,46 +62,6 @@ def is_plausible(state: PhysicsState) -> jax.Array:
     return jnp.all(jnp.isfinite(rows) & (jnp.abs(rows) < MAX_VALUE), axis=-1)
 
 
-def default_physics() -> str:
-    """The engine that `auto` stands for on this machine's default JAX backend (DESIGN.md, decision 4)."""
-    backend = jax.default_backend()
-    if backend == "cpu":
-        return "native"
-    if backend in ("gpu", "cuda"):
-        from hcp_jax.physics import mjx
-
-        return "mjx-warp" if mjx.has_warp() else "mjx-jax"
-    return "mjx-jax"
-
-
 def chosen_integrator(name: str, integrator: str) -> str:
     """The integrator that an engine's name `native-INTEGRATOR` overrules `integrator` with."""
     return name.removeprefix("native-") if name.startswith("native-") else integrator
-
-
-def make_physics(name: str, pool: RobotPool, sim_dt: float, integrator: str) -> Physics:
-    """Builds the engine `name` for the robots of `pool`.
-
-    Args:
-        name: one of `PHYSICS`, or `native-INTEGRATOR` to overrule the integrator (`native-rk4`).
-        pool: `robots` passed to `step` must be rows of this pool.
-        sim_dt: physics time step [s].
-        integrator: one of `INTEGRATORS`.
-
-    Raises:
-        ValueError: the name or the integrator is unknown.
-    """
-    if name == "auto":
-        name = default_physics()
-    integrator = chosen_integrator(name, integrator)
-    if integrator not in INTEGRATORS:
-        raise ValueError(f"integrator={integrator!r}: expected one of {', '.join(INTEGRATORS)}")
-    if name == "native" or name.startswith("native-"):
-        from hcp_jax.physics import native
-
-        return native.NativePhysics(pool, sim_dt, integrator)
-    if name in ("mjx-warp", "mjx-jax"):
-        from hcp_jax.physics import mjx
-
-        return mjx.MjxPhysics(pool, sim_dt, integrator, impl=name.removeprefix("mjx-"))
-    raise ValueError(f"physics={name!r}: expected one of {', '.join(PHYSICS)} or native-{{{'|'.join(INTEGRATORS)}}}")

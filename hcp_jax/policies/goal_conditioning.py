@@ -21,10 +21,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from hcp_jax.hardware.arm_encodings import ARM_ENCODINGS, encode_arms
+from hcp_jax.hardware.chain import GRAVITY
 from hcp_jax.hardware.joint_slots import JointSlots
 from hcp_jax.hardware.kinematics import exact_einsum, joint_poses, quat_to_matrix
 from hcp_jax.hardware.pool import RobotPool
-from hcp_jax.hardware.random_chain import GRAVITY
 from hcp_jax.policies.conditioning import Embedding
 
 MOTOR_LOADS = "chain_fk+jacobian+dynamics"

@@ -35,26 +35,8 @@ def hopper_section(published: Published) -> Section:
 
 def make_performance(published: Published) -> Item:
     """A row for each algorithm, and its curves."""
-    path, rows = published.find("hopper/summary.json"), []
-    for row, name in name_rows(path) if path else ():
-        with naming(path):
-            returns = [show_return(row[f"{kind}_mean"], row[f"{kind}_std"]) for kind in RETURNS]
-            steps, minutes = f"{number(row['env_steps']) / 1e6:.2f}", f"{number(row['wall_seconds']) / 60:.0f}"
-            cells = (
-                str(row["algorithm"]),
-                str(row["encoding"]),
-                name,
-                *returns,
-                str(len(row["seeds"])),
-                steps,
-                minutes,
-            )
-            rows.append(Row(cells))
-    columns = ("algorithm", "v_h", "experiment", *KINDS.values(), "seeds", "control steps [M]", "minutes")
-    tables = ()
-    if rows:
-        caption = "Return at the end: mean and sample standard deviation over seeds"
-        tables = (Table(caption, columns, "llcrrrrrr", tuple(rows), (published.show(path),)),)
+    path = published.find("hopper/summary.json")
+    tables = tabulate_performance(path, published.show(path)) if path else ()
     hoppers = [run.config for run in published.hoppers]
     names = [config.name for config in hoppers if config.pool.split != "new" and config.name != "hopper_embedding"]
     groups = published.runs_of(list(dict.fromkeys(names)))
@@ -63,6 +45,20 @@ def make_performance(published: Published) -> Item:
     ]
     commands = ("python -m hcp_jax.sweep experiments/hopper_curves.py --seeds 3 --out runs/hopper", COLLECT_COMMAND)
     return Item("Learning curves", "", tables, tuple(figure for figure in figures if figure), commands)
+
+
+def tabulate_performance(path: pathlib.Path, shown: str) -> tuple[Table, ...]:
+    """The table of a summary, called `shown`; none without rows."""
+    rows = []
+    for row, name in name_rows(path):
+        with naming(path):
+            returns = [show_return(row[f"{kind}_mean"], row[f"{kind}_std"]) for kind in RETURNS]
+            steps, minutes = f"{number(row['env_steps']) / 1e6:.2f}", f"{number(row['wall_seconds']) / 60:.0f}"
+            seeds = str(len(row["seeds"]))
+            rows.append(Row((str(row["algorithm"]), str(row["encoding"]), name, *returns, seeds, steps, minutes)))
+    columns = ("algorithm", "v_h", "experiment", *KINDS.values(), "seeds", "control steps [M]", "minutes")
+    caption = "Return at the end: mean and sample standard deviation over seeds"
+    return (Table(caption, columns, "llcrrrrrr", tuple(rows), (shown,)),) if rows else ()
 
 
 def name_rows(path: pathlib.Path) -> list[tuple[dict, str]]:
@@ -109,8 +105,25 @@ def name_set(name: str) -> str:
 
 def make_new_hoppers(published: Published) -> Item:
     """100 new hoppers: from another policy and from scratch."""
-    path, rows = published.find("hopper/finetune.json"), []
-    for row in read_json(path, list) if path else ():
+    path = published.find("hopper/finetune.json")
+    tables = tabulate_new_hoppers(path, published.show(path)) if path else ()
+    names = dict.fromkeys(run.config.name for run in published.hoppers if run.config.pool.split == "new")
+    groups, caption = published.runs_of(list(names)), "The 100 new hoppers."
+    figure = draw_groups(published, groups, "train_return_mean", caption, LABEL, None, name_start)
+    train = "python -m hcp_jax.train --config experiments"
+    commands = (
+        f"{train}/hopper_finetune_scratch.py --out runs/hopper/hopper_finetune_scratch_s0",
+        f"{train}/hopper_finetune_hidden.py --out runs/hopper/hopper_finetune_hidden_s0",
+        f"{train}/hopper_finetune.py --out runs/hopper/hopper_finetune_s0",
+        COLLECT_COMMAND,
+    )
+    return Item("Transfer to 100 new hoppers", "", tables, (figure,) if figure else (), commands)
+
+
+def tabulate_new_hoppers(path: pathlib.Path, shown: str) -> tuple[Table, ...]:
+    """The table of what `collect` wrote of fine-tuned runs, called `shown`; none without rows."""
+    rows = []
+    for row in read_json(path, list):
         with naming(path):
             goal, reached = number(row["scratch_env_steps"]), optional_number(row["pretrained_steps_to_scratch_final"])
             cells = (
@@ -125,22 +138,8 @@ def make_new_hoppers(published: Published) -> Item:
             rows.append(Row(cells))
     columns = ("run", "layers", "from scratch, in the end", "after [M steps]", "pretrained there after [M steps]")
     columns += ("share of steps [%]", "pretrained, in the end")
-    tables = ()
-    if rows:
-        tables = (
-            Table("Steps to the return of a training from scratch", columns, "clrrrrr", tuple(rows), (published.show(path),)),
-        )
-    names = dict.fromkeys(run.config.name for run in published.hoppers if run.config.pool.split == "new")
-    groups, caption = published.runs_of(list(names)), "The 100 new hoppers."
-    figure = draw_groups(published, groups, "train_return_mean", caption, LABEL, None, name_start)
-    train = "python -m hcp_jax.train --config experiments"
-    commands = (
-        f"{train}/hopper_finetune_scratch.py --out runs/hopper/hopper_finetune_scratch_s0",
-        f"{train}/hopper_finetune_hidden.py --out runs/hopper/hopper_finetune_hidden_s0",
-        f"{train}/hopper_finetune.py --out runs/hopper/hopper_finetune_s0",
-        COLLECT_COMMAND,
-    )
-    return Item("Transfer to 100 new hoppers", "", tables, (figure,) if figure else (), commands)
+    caption = "Steps to the return of a training from scratch"
+    return (Table(caption, columns, "clrrrrr", tuple(rows), (shown,)),) if rows else ()
 
 
 def make_embedding(published: Published) -> Item:

@@ -4,6 +4,7 @@ import base64
 import dataclasses
 import io
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -31,7 +32,7 @@ COLOURS = {
 }
 _DISTINCT = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # of what does not differ in what it sees
 OTHER_COLOUR = "#777777"
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 9,
@@ -158,7 +159,7 @@ def draw_spreads(spreads: Sequence[Spread], label: str, mark: tuple[float, str] 
 
 def draw_violin(axes: Axes, place: int, values: np.ndarray, colour: str) -> None:
     parts = axes.violinplot([values], [place], widths=0.8, showmedians=True)
-    for body in parts["bodies"]:
+    for body in parts["bodies"]:  # pyright: ignore[reportGeneralTypeIssues] (of matplotlib's stub)
         body.set(facecolor=colour, alpha=0.5)
     for name in ("cbars", "cmins", "cmaxes", "cmedians"):
         parts[name].set(color=colour, linewidth=1.0)

@@ -45,7 +45,7 @@ def make_sizes(published: Published) -> Item:
         trained = float(np.mean([each.success_mean for each in evaluation.types.values() if not each.zero_shot]))
         left_out = [each for each in evaluation.types.values() if each.zero_shot]
         shown = spread(left_out[0].success_mean, left_out[0].success_std)
-        steps = f"{config.total_env_steps / 1e6:.2f}"
+        steps = f"{evaluation.env_steps / 1e6:.2f}"
         rows.append(Row((str(number), decimals(trained), shown, str(config.seed), steps, evaluation.policy)))
         for values, success in zip(points.values(), (trained, left_out[0].success_mean), strict=True):
             values.append((number, success))
@@ -68,7 +68,7 @@ def make_size_curves(published: Published) -> Item:
 def read_sizes(published: Published) -> Sequence[tuple[int, Evaluation, Config]]:
     """The records in `arms/pool_sizes`, each with its policy's number of training arms of each type and its config.
 
-    Raises RecordError if one's run is not published, or it has no type that was left out."""
+    Raises RecordError if one's run is not published, or it lacks types trained on or the one left out."""
     folder = published.find("arms/pool_sizes")
     configs, found = {run.folder.name: run.config for run in published.arms}, []
     for path in sorted(folder.glob("*.json")) if folder else ():
@@ -77,7 +77,7 @@ def read_sizes(published: Published) -> Sequence[tuple[int, Evaluation, Config]]
             config = configs.get(evaluation.policy)
             if config is None or not isinstance(config.pool, ArmPoolConfig):
                 raise ValueError(f"no run of its policy {evaluation.policy} is published")
-            if not any(outcome.zero_shot for outcome in evaluation.types.values()):
-                raise ValueError("it has no type that was left out")
+            if {outcome.zero_shot for outcome in evaluation.types.values()} != {True, False}:
+                raise ValueError("expected types that were trained on, and one that was left out")
             found.append((config.pool.robots_per_type, evaluation, config))
     return found

@@ -1,9 +1,11 @@
 """Sketches of the robots, from their kinematics."""
 
 import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 from matplotlib.axes import Axes
+from mpl_toolkits.mplot3d import Axes3D
 
 from hcp_jax.hardware.arm import OTHER_ARMS, REMOVED_JOINTS, arm_spec
 from hcp_jax.hardware.chain import MAX_JOINTS, read_chain
@@ -26,9 +28,9 @@ def arm_pose(robot_type: str) -> tuple[np.ndarray, np.ndarray]:
         positions [n + 1, 3] m of its n joints and of the peg's tip, and the joints' axes [n, 3].
     """
     chain = read_chain(arm_spec("peg_insertion", robot_type).compile())
-    rotation = quat_to_matrix(chain.padded("quat").astype(np.float32))
+    rotation = quat_to_matrix(jnp.asarray(chain.padded("quat"), jnp.float32))
     angles = start_angles("reacher", robot_type)[_START]
-    positions, rotations = jax.device_get(joint_poses(chain.padded("pos"), rotation, angles))
+    positions, rotations = jax.device_get(joint_poses(jnp.asarray(chain.padded("pos")), rotation, angles))
     joints = chain.num_joints
     return positions[: joints + 1], rotations[:joints, :, 2]
 
@@ -38,6 +40,7 @@ def draw_arm(robot_type: str) -> str:
     positions, axes_of_joints = arm_pose(robot_type)
 
     def draw(axes: Axes) -> None:
+        assert isinstance(axes, Axes3D)
         path = np.concatenate([[[0.0, 0.0, 0.0]], positions])
         axes.plot(*path.T, color="#555555", linewidth=4, solid_capstyle="round", alpha=0.7)
         for position, axis in zip(positions, axes_of_joints, strict=False):
@@ -51,7 +54,7 @@ def draw_arm(robot_type: str) -> str:
             yticks=(0, 0.4),
             zticks=(0, 0.4, 0.8),
         )
-        axes.set_box_aspect([high - low for low, high in _ROOM.values()], zoom=1.0)
+        axes.set_box_aspect([high - low for low, high in _ROOM.values()])
         axes.set_proj_type("ortho")
         axes.view_init(elev=20, azim=-60)
         axes.tick_params(pad=-2, labelsize=7)

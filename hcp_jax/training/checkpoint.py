@@ -45,7 +45,13 @@ class Checkpoints:
         return ocp.CheckpointManager(self.folder / name, options=options, item_handlers=handlers)
 
     def save(self, iteration: int, state: TrainingState, is_best: bool = False) -> None:
-        """Starts writing in the background; the state's buffers may be donated as soon as this returns."""
+        """Starts writing in the background; the state's buffers may be donated as soon as this returns.
+
+        Where a run goes on from before its best checkpoint, the next best one replaces it.
+        """
+        if is_best:
+            for newer in [step for step in self._best.all_steps() if step > iteration]:
+                self._best.delete(newer)
         for manager in (self._newest, self._best) if is_best else (self._newest,):
             if iteration not in manager.all_steps():
                 manager.save(iteration, args=ocp.args.Composite(state=ocp.args.StandardSave(state)))

@@ -1,7 +1,6 @@
 """Learning curves as a picture."""
 
 import pathlib
-from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,20 +17,18 @@ _SERIES = {
 }
 
 
-def plot_curves(folders: Sequence[pathlib.Path], path: pathlib.Path) -> None:
-    """Draws the evaluation returns or success rates of run folders over control steps into a PNG file."""
+def plot_curves(folder: pathlib.Path, path: pathlib.Path) -> None:
+    """Draws the evaluation returns or success rates of a run folder over control steps into a PNG file."""
     figure = Figure(figsize=(7, 4.5), layout="constrained")
     axes = figure.subplots()
-    for folder in folders:
-        rows = read_rows(folder / METRICS_FILE)
-        for column, label in _SERIES.items():
-            points = [(int(row["env_steps"]) / 1e6, float(row[column])) for row in rows if row.get(column)]
-            if points:
-                x, y = np.asarray(points).T
-                axes.plot(x, y, marker="o", markersize=3, label=f"{folder.name}: {label}" if len(folders) > 1 else label)
+    rows = read_rows(folder / METRICS_FILE)
+    for column, label in _SERIES.items():
+        points = [(int(row["env_steps"]) / 1e6, float(row[column])) for row in rows if row.get(column)]
+        if points:
+            x, y = np.asarray(points).T
+            axes.plot(x, y, marker="o", markersize=3, label=label)
     axes.set_xlabel("control steps [million]")
-    is_goal_task = any("train_types_success" in row for folder in folders for row in read_rows(folder / METRICS_FILE)[:1])
-    axes.set_ylabel("success [%]" if is_goal_task else "return of one episode")
+    axes.set_ylabel("success [%]" if "train_types_success" in dict(*rows[:1]) else "return of one episode")
     axes.grid(alpha=0.3)
     axes.legend(frameon=False)
     figure.savefig(path, dpi=130)

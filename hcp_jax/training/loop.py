@@ -115,6 +115,8 @@ def _run(
         say(f"resuming at {iteration * run.config.batch_size:,} steps")
     elif resume:
         say("the run ended before its first checkpoint: starting again")
+    if resume:
+        do_in_main(lambda: run_folder.write_changes(folder, run.config))
     return TrainingLoop(run, folder, checkpoints, iteration).run(state, interrupt)
 
 
@@ -241,5 +243,5 @@ class TrainingLoop:
         self._checkpoints.close()
         if self._metrics:
             self._metrics.close()
-            plot_curves([self._folder], self._folder / "curves.png")
+            plot_curves(self._folder, self._folder / "curves.png")
         self._progress.say(f"done in {format_seconds(self._progress.elapsed)}: {self._folder}")

@@ -10,6 +10,8 @@ from typing import Any
 
 import tensorboardX
 
+from hcp_jax.training.run_folder import RunFolderError
+
 METRICS_FILE = "metrics.csv"
 TIMING_FILE = "timing.csv"
 
@@ -56,11 +58,20 @@ class MetricsWriter:
 
 
 def read_rows(path: pathlib.Path) -> list[dict[str, str]]:
-    """Rows of a CSV file; none if it does not exist."""
+    """Rows of a run's CSV file; none if it does not exist. Raises RunFolderError if it is damaged."""
     if not path.exists():
         return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
+    try:
+        with path.open(newline="") as file:
+            rows = list(csv.DictReader(file))
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise RunFolderError(f"{path}: damaged or of another version ({error})") from error
+    for row in rows:
+        if not (row.get("env_steps") or "").isdecimal():
+            raise RunFolderError(
+                f"{path}: damaged or of another version (env_steps={row.get('env_steps')!r}: expected a whole number)"
+            )
+    return rows
 
 
 def _write_rows(path: pathlib.Path, rows: list[dict[str, str]]) -> None:

@@ -125,6 +125,17 @@ def write_start(folder: pathlib.Path, config: Config, physics: str) -> None:
         save_robot(load_own_robot(config), saved_robot_path(folder, config))
 
 
+def write_changes(folder: pathlib.Path, config: Config) -> None:
+    """Records what a resumed run changes (`_CHANGEABLE`) in its `config.json`, in one step."""
+    path = folder / CONFIG_FILE
+    saved = json.loads(path.read_text())
+    changed = saved | {name: getattr(config, name) for name in _CHANGEABLE}
+    if changed != saved:
+        temporary = path.with_suffix(".tmp")
+        temporary.write_text(json.dumps(changed, indent=2) + "\n")
+        temporary.replace(path)
+
+
 def describe_environment(physics: str) -> dict:
     """Versions, device and commit, for the record."""
     versions = {}

@@ -3,8 +3,9 @@ import dataclasses
 import pytest
 
 from hcp_jax import benchmark, presets
-from hcp_jax.benchmarks.training import benchmark_training, samples_per_step, time_to_success
+from hcp_jax.benchmarks.training import benchmark_success, benchmark_training, samples_per_step, time_to_success
 from hcp_jax.config import ArmConfig, ArmPoolConfig, DDPGConfig, HopperConfig, HopperPoolConfig, PPOConfig
+from hcp_jax.errors import UserError
 
 HOPPER = presets.hopper(
     "a",
@@ -52,6 +53,29 @@ def test_the_time_to_success_ends_with_the_target_or_the_limit():
     assert (reached["reached"], reached["env_steps"]) == (True, 40)
     given_up = time_to_success(dataclasses.replace(REACHER, seed=1), "hcp_jax", target=101.0, limit=0.01)
     assert (given_up["reached"], given_up["env_steps"]) == (False, 40)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (
+            ["train", "--to-success", "90", "--rows", "sb3-ppo"],
+            "--rows=sb3-ppo: expected of train --to-success: hcp_jax, sb3-her",
+        ),
+        (["learner", "--to-success", "90"], "--to-success: goes with train, not learner"),
+    ],
+)
+def test_rows_without_a_time_to_success_are_refused(arguments, expected, capsys):
+    with pytest.raises(SystemExit) as exit_info:
+        benchmark.main(arguments)
+    assert exit_info.value.code == 2
+    assert expected in capsys.readouterr().err
+
+
+def test_a_peer_that_is_missing_is_said_before_anything_is_timed(monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(UserError, match="--rows sb3-her: needs the extra bench"):
+        next(benchmark_success(REACHER, ["hcp_jax", "sb3-her"], target=0.0, limit=1.0))
 
 
 def test_the_hopper_has_no_success(tmp_path, capsys):

@@ -14,7 +14,7 @@ from hcp_jax.hardware.arm import arm_spec
 from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES, make_arm_pool, make_chain_pool
 from hcp_jax.hardware.chain import read_chain
 from hcp_jax.hardware.ranges import ArmRanges
-from hcp_jax.physics.base import make_physics
+from hcp_jax.physics.build import make_physics
 
 
 def make_env(task: ArmTask, types: str = "AI", num_per_type: int = 2) -> GoalEnv:

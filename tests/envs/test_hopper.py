@@ -7,7 +7,8 @@ import pytest
 
 from hcp_jax.envs.base import PoolEnv, draw_evenly
 from hcp_jax.envs.hopper import Hopper
-from hcp_jax.physics.base import PhysicsState, make_physics
+from hcp_jax.physics.base import PhysicsState
+from hcp_jax.physics.build import make_physics
 
 
 @pytest.fixture(scope="module")

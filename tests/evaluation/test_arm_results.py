@@ -11,6 +11,7 @@ from hcp_jax.evaluation.table1 import make_table1
 from hcp_jax.training.metrics import read_rows
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+MEASURED = {"checkpoint_env_steps": 1, "trials": 1, "robots_per_trial": 1, "physics": "native", "integrator": "rk4"}
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +68,7 @@ def test_table_1_averages_evaluations_of_equal_settings_and_steps_alone(results,
     others = {
         "arms_s1": ({"seed": 1}, {}),
         "arms_s2": ({"seed": 2}, {"checkpoint_env_steps": 160}),
+        "arms_s3": ({"seed": 3}, {"physics": "native-rk4", "integrator": "rk4"}),
         "wide_s0": ({"num_envs": 2 * config["num_envs"]}, {}),
     }
     for name, (change, measured) in others.items():
@@ -78,6 +80,7 @@ def test_table_1_averages_evaluations_of_equal_settings_and_steps_alone(results,
     assert {policies: row["control_steps"] for policies, row in rows.items()} == {
         ("arms_s0", "arms_s1"): 320,
         ("arms_s2",): 160,
+        ("arms_s3",): 320,
         ("wide_s0",): 320,
     }
     both = rows["arms_s0", "arms_s1"]
@@ -138,9 +141,15 @@ def test_an_evaluation_of_a_policy_that_was_replaced_is_named(results, finished_
         ("arms/evaluations/arms_s0.json", {"types": {}}, "no field 'checkpoint_env_steps'"),
         (
             "arms/evaluations/arms_s0.json",
-            {"checkpoint_env_steps": 1, "trials": 1, "robots_per_trial": 1, "types": {"H": {}}},
+            MEASURED | {"types": {"H": {}}},
             "no field 'success_mean'",
         ),
+        (
+            "arms/evaluations/arms_s0.json",
+            MEASURED | {"types": {}, "ranges": {"damping": [1.0, 2.0]}},
+            "ranges={'damping': [1.0, 2.0]}: expected the newest checkpoint",
+        ),
+        ("arms/runs/arms_s0/metrics.csv", "a\n1\n", "env_steps=None: expected a whole number"),
         ("arms/runs/arms_s0/environment.json", {}, "no field 'commit'"),
     ],
 )
@@ -148,7 +157,7 @@ def test_collecting_names_the_damaged_file(results, tmp_path, capsys, name, cont
     shutil.copytree(results, tmp_path / "results")
     path = tmp_path / "results" / name
     path.parent.mkdir(exist_ok=True)
-    path.write_text(json.dumps(content))
+    path.write_text(content if isinstance(content, str) else json.dumps(content))
     with pytest.raises(SystemExit) as exit_info:
         collect.main(["--out", str(tmp_path / "results")])
     assert exit_info.value.code == 2

@@ -6,7 +6,7 @@ import numpy as np
 
 from hcp_jax.config import EmbeddingConfig
 from hcp_jax.experiment import build
-from hcp_jax.physics.base import default_physics
+from hcp_jax.physics.build import default_physics
 
 
 def test_the_engine_asked_for_goes_before_the_configs_and_that_before_the_machines(tiny_config, monkeypatch):

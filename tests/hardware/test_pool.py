@@ -40,8 +40,10 @@ def test_a_damaged_pool_is_refused(pool, tmp_path):
     (tmp_path / "pool" / "pool.npz").write_bytes(bytes(data))
     with pytest.raises(PoolError, match="damaged"):
         RobotPool.load(tmp_path / "pool")
-    with pytest.raises(PoolError, match="not a robot pool"):
-        RobotPool.load(tmp_path / "nowhere")
+    (tmp_path / "pool" / "pool.json").write_text("[]")
+    for name in ("pool", "nowhere"):
+        with pytest.raises(PoolError, match="not a robot pool"):
+            RobotPool.load(tmp_path / name)
 
 
 def test_variants_that_differ_in_an_unbatched_field_are_refused(pool):

@@ -7,9 +7,9 @@ import pytest
 from hcp_jax.hardware import random_chain
 from hcp_jax.hardware.arm_pool import make_arm_pool
 from hcp_jax.hardware.catalogue import catalogue_names, load_robot
-from hcp_jax.hardware.chain import Chain
+from hcp_jax.hardware.chain import GRAVITY, Chain
 from hcp_jax.hardware.pool import RobotPool
-from hcp_jax.hardware.random_chain import GRAVITY, sample_chain, sample_reaching_chains
+from hcp_jax.hardware.random_chain import sample_chain, sample_reaching_chains
 from hcp_jax.hardware.ranges import ArmRanges, ChainRanges, RangeError
 from hcp_jax.hardware.reaching import MAX_ERROR, reach_points
 from hcp_jax.hardware.start_poses import GRID, REACHER_GOALS

@@ -3,7 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hcp_jax.hardware.ranges import HopperRanges, RangeError, sample_half_below_one, sample_uniform
+from hcp_jax.hardware.arm import LINK_EFFECTS, arm_spec
+from hcp_jax.hardware.ranges import LINK_LENGTHS, ArmRanges, HopperRanges, RangeError, sample_half_below_one, sample_uniform
 
 finite = st.floats(0.001, 100.0)
 
@@ -25,6 +26,16 @@ def test_half_of_the_draws_lie_below_one():
 
 def test_a_zero_width_range_gives_its_value_exactly():
     assert sample_uniform(np.random.default_rng(0), (0.3, 0.3)) == 0.3
+
+
+@pytest.mark.parametrize(("task", "robot_type"), [("reacher", "I"), ("peg_insertion", "I"), ("peg_insertion", "J")])
+def test_a_link_may_become_as_short_as_it_can_without_turning_round(task, robot_type):
+    arm = arm_spec(task, robot_type)
+    for link, effect in LINK_EFFECTS.items():
+        assert abs(arm.body(effect.child).pos[effect.axis]) in (pytest.approx(LINK_LENGTHS[link]), 0.0)
+        ArmRanges(**{link: (-LINK_LENGTHS[link], 0.0)})
+        with pytest.raises(RangeError, match=f"ranges.{link}=.*must not be below"):
+            ArmRanges(**{link: (-LINK_LENGTHS[link] - 1e-3, 0.0)})
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 from robot_texts import MJCF, arm, joint, link, robot
 
+from hcp_jax.hardware.own_arm import make_own_pool, make_own_variants
 from hcp_jax.hardware.pool import robots_path
+from hcp_jax.hardware.ranges import ArmRanges
 from hcp_jax.hardware.robot_file import ASSUMED_TORQUE_LIMITS, RobotFileError, read_robot, read_robot_here
 
 BOMB = '<?xml version="1.0"?><!DOCTYPE b [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><robot name="&b;"/>'
@@ -93,8 +95,38 @@ def test_a_missing_file_a_name_twice_and_a_missing_tip_are_said(tmp_path):
         read_robot(tmp_path / "nothing.urdf")
     with pytest.raises(RobotFileError, match="repeated name 'j0' in joint"):
         read_robot(write(tmp_path, arm().replace('"j1"', '"j0"')))
-    with pytest.raises(RobotFileError, match="--tip=hand: no such link; there are l0, l1, l2"):
-        read_robot(write(tmp_path, arm()), tip="hand")
+    for name in ("hand", "world"):
+        with pytest.raises(RobotFileError, match=f"--tip={name}: no such link; there are l0, l1, l2"):
+            read_robot(write(tmp_path, arm()), tip=name)
+
+
+def test_why_reading_ended_without_an_answer_is_said(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    (tmp_path / "mujoco.py").write_text("raise RuntimeError('no such library')")
+    with pytest.raises(RobotFileError, match=r"without an answer \(exit code 1\): RuntimeError: no such library"):
+        read_robot(write(tmp_path, arm()))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_flat_link_may_be_turned_in_any_way(seed, tmp_path):
+    """Its largest moment of inertia is the sum of the others, which rounding leaves on either side."""
+    turn = " ".join(f"{angle:.4f}" for angle in np.random.default_rng(seed).uniform(-3, 3, 3))
+    text = arm().replace('<origin xyz="0 0 0.1"/>', f'<origin xyz="0 0 0.1" rpy="{turn}"/>')
+    read = read_robot_here(write(tmp_path, text), None, None)
+    np.testing.assert_allclose(read.chain.inertia, [[0.03, 0.02, 0.01]] * 2, rtol=1e-6)
+    assert not [note for note in read.notes if "inertia" in note]
+    make_own_pool("peg_insertion", read)
+    make_own_variants("peg_insertion", read, ArmRanges(), 5, seed)
+
+
+@pytest.mark.parametrize("form", ["urdf", "mjcf"])
+def test_an_inertia_that_is_too_large_by_its_digits_is_lowered_and_said(form, tmp_path):
+    text = arm().replace('izz="0.03"', 'izz="0.0302"') if form == "urdf" else MJCF.replace("0.01 0.02 0.03", "0.01 0.02 0.0302")
+    read = read_robot_here(write(tmp_path, text), None, None)
+    np.testing.assert_allclose(read.chain.inertia, [[0.03, 0.02, 0.01]] * 2, rtol=1e-6)
+    assert "inertia of link l1 lowered by 0.66 %: it was above what a body can have (A + B >= C)" in read.notes
+    with pytest.raises(RobotFileError, match=r"inertia must satisfy A \+ B >= C"):
+        read_robot_here(write(tmp_path, text.replace("0.0302", "0.04")), None, None)
 
 
 def test_fingers_are_fixed_and_a_fork_needs_a_tip(tmp_path):

@@ -8,7 +8,8 @@ import pytest
 
 from hcp_jax.hardware.arm_pool import make_arm_pool
 from hcp_jax.hardware.ranges import ArmRanges
-from hcp_jax.physics.base import PhysicsState, make_physics
+from hcp_jax.physics.base import PhysicsState
+from hcp_jax.physics.build import make_physics
 
 SIM_DT, NUM_SUBSTEPS, NUM_CONTROLS = 0.004, 5, 10
 

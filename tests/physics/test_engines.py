@@ -9,7 +9,8 @@ import pytest
 
 from hcp_jax.envs.hopper import Hopper
 from hcp_jax.hardware.pool import MEAN_INERTIA, RobotPool
-from hcp_jax.physics.base import PhysicsState, is_plausible, make_physics
+from hcp_jax.physics.base import PhysicsState, is_plausible
+from hcp_jax.physics.build import make_physics
 from hcp_jax.physics.mjx import MjxPhysics
 from hcp_jax.physics.native import get_batch_fields
 

@@ -196,6 +196,7 @@ def write_run(folder: pathlib.Path, config: Config, rows: list[dict]) -> None:
 
 def evaluation(policy: str, types: dict, **changes) -> dict:
     record = {"run": f"results/policies/{policy}", "task": "peg_insertion", "encoding": "none", "trials": 1}
+    record["checkpoint_env_steps"] = 3_000_000
     return record | {"robots_per_trial": 100, "ranges": {}, "types": types} | changes
 
 
@@ -229,7 +230,7 @@ def results(tiny_arms, tiny_config, tmp_path_factory) -> pathlib.Path:
         write_json(folder / "arms" / "damping" / f"low_s0_{low:g}_{high:g}.json", record)
     for number, of_types, left_out in ((40, (80.0, 90.0), 70.0), (10, (30.0, 50.0), 20.0)):
         pool = dataclasses.replace(tiny_arms.pool, robots_per_type=number)
-        config = dataclasses.replace(tiny_arms, name=f"reacher_pool_{number}", total_env_steps=3_000_000, pool=pool)
+        config = dataclasses.replace(tiny_arms, name=f"reacher_pool_{number}", pool=pool)
         write_run(folder / "arms" / "runs" / f"{config.name}_s0", config, [{"env_steps": 80, "train_types_success": 1.0}])
         types = {name: outcome(mean, zero_shot=False) for name, mean in zip("AB", of_types, strict=True)}
         record = evaluation(f"{config.name}_s0", types | {"H": outcome(left_out)})
@@ -365,7 +366,7 @@ DAMAGED = {
     "metrics of something else": (
         "hopper/runs/hopper_none_s0/metrics.csv",
         "a,train_return_mean\n1,2\n",
-        "no field 'env_steps'",
+        "env_steps=None: expected a whole number",
     ),
     "a rehearsal without goals": (
         "rehearsal/reacher_sawyer_s0_sawyer.json",
@@ -385,7 +386,12 @@ DAMAGED = {
     "pool sizes without a type left out": (
         "arms/pool_sizes/reacher_pool_10_s0.json",
         json.dumps(evaluation("reacher_pool_10_s0", {"A": outcome(1.0, zero_shot=False)})),
-        "no type that was left out",
+        "expected types that were trained on, and one that was left out",
+    ),
+    "pool sizes without types trained on": (
+        "arms/pool_sizes/reacher_pool_10_s0.json",
+        json.dumps(evaluation("reacher_pool_10_s0", {"H": outcome(1.0)})),
+        "expected types that were trained on, and one that was left out",
     ),
     "summary": ("hopper/summary.json", '[{"algorithm": "PPO"}]', "no field"),
     "finetune": ("hopper/finetune.json", '[{"run": "a"}]', "no field"),

@@ -64,6 +64,15 @@ def test_a_best_checkpoint_that_a_kill_prevented_is_made_up_for(finished_run, ti
     assert Checkpoints(folder / "checkpoints", read_only=True).best() == 8
 
 
+def test_a_best_checkpoint_of_a_part_that_is_gone_gives_way_to_the_next_best(tmp_path, finished_run, tiny_config):
+    state = loop.make_experiment(tiny_config).init_state()
+    checkpoints = Checkpoints(tmp_path / "checkpoints")
+    for iteration in (20, 15):  # the run went on from before 20
+        checkpoints.save(iteration, state, is_best=True)
+    checkpoints.wait()
+    assert Checkpoints(tmp_path / "checkpoints", read_only=True).best() == 15
+
+
 @pytest.mark.parametrize("cut", [3, *(pytest.param(cut, marks=pytest.mark.slow) for cut in (2, 5))])
 def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished_run, tiny_config, tmp_path, monkeypatch, cut):
     """Cut after `cut` of 8 iterations: between two evaluations and at one."""
@@ -177,6 +186,10 @@ def test_a_run_goes_on_from_its_folder_alone_and_may_be_given_more_steps(finishe
     folder = shutil.copytree(finished_run, tmp_path / "run")
     train.main(["--resume", "--out", str(folder), "--config.total_env_steps=640"])
     assert [int(row["env_steps"]) for row in metrics(folder)] == [128, 256, 384, 512, 640]
+    assert loop.run_folder.read_config(folder).total_env_steps == 640
+    assert loop.run_folder.find_differences(*(loop.run_folder.read_config(f) for f in (finished_run, folder))) == [
+        ("total_env_steps", 512, 640)
+    ]
 
 
 def test_heldout_robots_do_not_depend_on_the_training_seed(tiny_config):

@@ -1,4 +1,5 @@
 import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -29,9 +30,12 @@ def test_a_run_keeps_the_arm_that_its_file_said(tiny_arms, tmp_path):
     run_folder.check_resumable(tmp_path / "run", kept)
     np.testing.assert_array_equal(load_own_robot(kept).chain.pos, read_robot_here(TEMPLATE, None, "l6").chain.pos)
     path = tmp_path / "run" / "robot" / "own.json"
-    path.write_text(path.read_text().replace('"mass"', '"weight"'))
-    with pytest.raises(RobotFileError, match=r"own\.json: damaged record of an arm"):
-        load_own_robot(kept)
+    record = json.loads(path.read_text())
+    for field, change in (("weight", [1.0]), ("mass", [-1.0]), ("inertia", [[1.0, 0.1, 0.1]]), ("joint_range", [[1.0, -1.0]])):
+        chain = record["chain"] | {field: change * len(record["joints"])}
+        path.write_text(json.dumps(record | {"chain": chain}))
+        with pytest.raises(RobotFileError, match=r"own\.json: damaged record of an arm"):
+            load_own_robot(kept)
 
 
 def test_seeds_on_the_same_arm_are_one_experiment_wherever_its_file_is(tiny_arms, tmp_path):
