@@ -1,7 +1,8 @@
 """Exp. I with 10 to 1,440 training arms of each type, at equal steps: what more robots bring to robots never seen (not in the
 paper). 1,440 of each of eight types are as many arms as the run has episodes. Preset: fast with small batches, aligned joints.
 
-`python -m hcp_jax.sweep experiments/pool_sizes.py --summary results/ablations/pool_sizes.json`
+`python -m hcp_jax.sweep experiments/pool_sizes.py --out runs/arms`, then `collect runs/arms --out results`, and for each
+`evaluate results/policies/NAME_s0 --without-robots --json results/arms/pool_sizes/NAME_s0.json`, which `report` shows.
 """
 
 import dataclasses

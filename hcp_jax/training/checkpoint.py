@@ -49,9 +49,11 @@ class Checkpoints:
 
         Where a run goes on from before its best checkpoint, the next best one replaces it.
         """
-        if is_best:
-            for newer in [step for step in self._best.all_steps() if step > iteration]:
-                self._best.delete(newer)
+        newer = [step for step in self._best.all_steps() if step > iteration] if is_best else []
+        if newer:
+            self._best.wait_until_finished()
+        for step in newer:
+            self._best.delete(step)
         for manager in (self._newest, self._best) if is_best else (self._newest,):
             if iteration not in manager.all_steps():
                 manager.save(iteration, args=ocp.args.Composite(state=ocp.args.StandardSave(state)))

@@ -66,7 +66,7 @@ def test_a_row_of_table_1_is_two_rows_of_its_file(row):
         assert len(same[0]["seeds"]) == int(seeds[1] if seeds else 1)
         assert ("FiLM" in row[column]) == (same[0]["network"] == "film")
         minutes.append(f"{same[0]['wall_seconds'] / 60:.0f}")
-    assert row["minutes"] == ", ".join(minutes)
+    assert row["minutes of each"] == ", ".join(minutes)
 
 
 BY_TYPE = find_tables("docs/results.md", "run", "masked", "H, zero-shot")[0]
