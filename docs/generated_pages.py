@@ -1,6 +1,6 @@
 """Pages of the site that are written by nobody: mkdocs runs this file as a hook.
 
-The home page is README.md, the configuration reference follows from the dataclasses in `hcp_jax/config/`, and the figures and
+The home page is README.md, that of the robots `robots/README.md`, the configuration reference follows from the dataclasses in `hcp_jax/config/`, and the figures and
 tables under `results/` are published beside the pages that point to them.
 """
 
@@ -40,7 +40,8 @@ def on_files(files, config):
     """mkdocs asks here for the files of the site."""
     from mkdocs.structure.files import File  # the pages can be made without mkdocs
 
-    pages = {"index.md": home_page(), "configuration.md": configuration_page()}
+    robots = (ROOT / "robots" / "README.md").read_text()
+    pages = {"index.md": home_page(), "configuration.md": configuration_page(), "robots.md": robots}
     pages |= {f"api/{name}.md": page for name, page in api_pages().items()}
     for name, page in pages.items():
         files.append(File.generated(config, name, content=page))
@@ -56,13 +57,15 @@ def on_page_markdown(markdown, **_):
 
 def point_into_site(text: str) -> str:
     """A page's text whose links, which hold in a checkout, lead to the site's own pages and to the results beside them."""
-    text = text.replace("](../README.md", "](index.md").replace("](../results/", "](results/")
+    places = {"](../README.md": "](index.md", "](../robots/README.md": "](robots.md", "](../results/": "](results/"}
+    for there, here in places.items():
+        text = text.replace(there, here)
     return re.sub(r"\]\(\.\./hcp_jax/(\w+)\)", r"](api/\1.md)", text.replace("](../hcp_jax/config)", "](configuration.md)"))
 
 
 def home_page() -> str:
     """README.md, whose links start at the repository's root."""
-    return (ROOT / "README.md").read_text().replace("](docs/", "](")
+    return (ROOT / "README.md").read_text().replace("](docs/", "](").replace("](robots/README.md", "](robots.md")
 
 
 def api_pages() -> dict[str, str]:

@@ -64,13 +64,13 @@ def main(arguments: list[str] | None = None) -> None:
         if options.to_success is not None and config.task == "hopper":
             raise ConfigError("--to-success: the hopper has no success: expected a reacher or peg_insertion")
         command_line.enable_compilation_cache()
-        environment, rows = describe_environment(resolve_physics(config.physics)), []
+        machine, rows = describe_environment(resolve_physics(config.physics)), []
         for row in measure(options, config):
             rows.append(row)
             numbers = (f"{name} {format_number(value)}" for name, value in row.items() if isinstance(value, (int, float)))
             print(row["name"], *numbers, sep="  ", flush=True)
             if options.json:  # what is measured stays, if a later row is broken off
-                write_json(options.json, {"environment": environment, "rows": rows})
+                write_json(options.json, {"machine": machine, "rows": rows})
         if options.subject == "physics":
             print_speeds(config.name, rows)
         else:
@@ -116,7 +116,7 @@ def print_speeds(title: str, rows: list[dict]) -> None:
         for batch in batches:
             table.add_column(f"{batch:,} envs", justify="right")
         for name in dict.fromkeys(row["name"] for row in rows):
-            speeds = {row["num_envs"]: row[f"{unit}_steps_per_second"] for row in rows if row["name"] == name}
+            speeds = {row["num_envs"]: row[f"{unit}_steps_per_s"] for row in rows if row["name"] == name}
             table.add_row(name, *(f"{speeds[batch]:,.0f}" for batch in batches))
         command_line.show(table)
 

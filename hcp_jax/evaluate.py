@@ -30,7 +30,7 @@ def main(arguments: list[str] | None = None) -> None:
         metavar="N",
         help="also regress v_h of each new robot from its first N control steps (HCP-I with identification): 50 200 1000",
     )
-    parser.add_argument("--types", nargs="*", help="robot types to evaluate, A to K, of the reacher A to I and R4 to R7 (the hopper has one: hopper)")
+    parser.add_argument("--types", nargs="*", help="robot types to evaluate: A to K, of the reacher A to I and R4 to R7")
     parser.add_argument(
         "--range",
         nargs=3,

@@ -36,7 +36,7 @@ def benchmark_learner(config: Config, seconds: float) -> list[dict]:
         seconds: shortest time of one measurement; the median of three counts.
 
     Returns:
-        Rows with name, task, num_envs, seconds (of one iteration or update), control_steps_per_second (of collecting rows),
+        Rows with name, task, num_envs, seconds (of one iteration or update), control_steps_per_s (of collecting rows),
         flops and flops_per_second (of `update` and `matmul`, matrix products counted) and replay_bytes of DDPG.
     """
     run = make_experiment(config)
@@ -59,7 +59,7 @@ def benchmark_learner(config: Config, seconds: float) -> list[dict]:
 
     def collecting_row(name: str, duration: float) -> dict:
         speed = round(config.batch_size / duration, 1)
-        return {"name": name, **common, "seconds": round(duration, 4), "control_steps_per_second": speed}
+        return {"name": name, **common, "seconds": round(duration, 4), "control_steps_per_s": speed}
 
     def learning_row(name: str, duration: float) -> dict:
         speeds = {"seconds": round(duration, 6), "flops": round(flops), "flops_per_second": round(flops / duration)}

@@ -45,7 +45,7 @@ def benchmark_physics(config: Config, batches: list[int], rows: Sequence[str], s
         seconds: shortest time of one measurement; the median of three counts.
 
     Yields:
-        name, task, num_envs, control_steps_per_second, physics_steps_per_second, num_control_steps (of one measurement).
+        name, task, num_envs, control_steps_per_s, physics_steps_per_s, num_control_steps (of one measurement).
     """
     run = make_experiment(config)
     assert isinstance(run, (ArmExperiment, HopperExperiment))
@@ -64,8 +64,8 @@ def benchmark_physics(config: Config, batches: list[int], rows: Sequence[str], s
                 "name": name,
                 "task": config.task,
                 "num_envs": num_envs,
-                "control_steps_per_second": round(speed * num_envs, 1),
-                "physics_steps_per_second": round(speed * num_envs * substeps, 1),
+                "control_steps_per_s": round(speed * num_envs, 1),
+                "physics_steps_per_s": round(speed * num_envs * substeps, 1),
                 "num_control_steps": count,
             }
 

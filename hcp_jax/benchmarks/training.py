@@ -52,7 +52,7 @@ def benchmark_training(config: Config, rows: Sequence[str], seconds: float) -> I
             iterations.
 
     Yields:
-        name, task, samples_per_step, control_steps_per_second.
+        name, task, samples_per_step, control_steps_per_s.
 
     Raises:
         UserError: a peer is not installed; nothing was measured.
@@ -60,14 +60,14 @@ def benchmark_training(config: Config, rows: Sequence[str], seconds: float) -> I
     check_installed([name for name in rows if name in PEERS[config.task]])
     for name in rows:
         if name == "hcp_jax":
-            speed = benchmark_learner(config, seconds)[0]["control_steps_per_second"]
+            speed = benchmark_learner(config, seconds)[0]["control_steps_per_s"]
         elif name not in PEERS[config.task]:
             continue
         else:
             time_peer = {"sb3-ppo": time_sb3_ppo, "brax-ppo": time_brax_ppo, "sb3-her": time_sb3_her}[name]
             speed = time_peer(config, seconds)
         per_step = round(samples_per_step(config), 3)
-        yield {"name": name, "task": config.task, "samples_per_step": per_step, "control_steps_per_second": round(speed, 1)}
+        yield {"name": name, "task": config.task, "samples_per_step": per_step, "control_steps_per_s": round(speed, 1)}
 
 
 def check_installed(peers: Sequence[str]) -> None:

@@ -45,7 +45,7 @@ def test_stable_baselines3_learns_on_our_worlds_beside_us():
     pytest.importorskip("stable_baselines3")
     rows = list(benchmark_training(REACHER, ["hcp_jax", "sb3-her"], seconds=0.01))
     assert [row["name"] for row in rows] == ["hcp_jax", "sb3-her"]
-    assert all(row["control_steps_per_second"] > 0 for row in rows)
+    assert all(row["control_steps_per_s"] > 0 for row in rows)
 
 
 def test_the_time_to_success_ends_with_the_target_or_the_limit():

@@ -19,7 +19,7 @@ def read_tables(page: str) -> list[list[dict[str, str]]]:
     """Every table of a page, as rows by the columns' titles; a column without a title is numbered."""
     tables, lines = [], []
     for line in [*(ROOT / page).read_text().splitlines(), ""]:
-        if line.startswith("|"):
+        if line.strip().startswith("|"):
             lines.append([cell.strip() for cell in line.strip().strip("|").split("|")])
         elif lines:
             titles = [title or str(i) for i, title in enumerate(lines[0])]
@@ -46,7 +46,7 @@ def find_run(name: str) -> pathlib.Path:
 
 def read_evaluations(name: str) -> list[dict]:
     """Of each seed of an arm run that a table names, success by type."""
-    paths = [path for kind in ("arms", "ablations") for path in (RESULTS / kind / "evaluations").glob(f"{name}*.json")]
+    paths = [path for kind in ("arms", "ablations") for path in sorted((RESULTS / kind / "evaluations").glob(f"{name}*.json"))]
     paths = [path for path in paths if re.fullmatch(rf"{name}(_s\d)?", path.stem)]
     return [json.loads(path.read_text())["types"] for path in paths]
 
@@ -84,6 +84,29 @@ def test_success_by_type_is_that_of_the_evaluations(row):
             mean, std = (np.mean([outcome[name] for outcome in outcomes]) for name in ("success_mean", "success_std"))
             numbers = [float(number) for number in said.split(" ± ")]
             assert numbers == pytest.approx([mean, std][: len(numbers)], abs=0.0501), title
+
+
+WITHOUT_AND_WITH_FILM = {
+    "V": ("peg_aligned_leave_h", "peg_film_leave_h"),
+    "VII": ("peg_aligned_leave_e_masked", "peg_film_leave_e"),
+    "IX": ("peg_aligned_leave_i", "peg_film_leave_i"),
+    "XI": ("random_peg_jacobian_leave_h", "random_peg_film_leave_h"),
+    "XIII": ("random_peg_aligned_leave_e", "random_peg_film_leave_e"),
+    "XV": ("random_peg_aligned_leave_i", "random_peg_film_leave_i"),
+}
+
+
+@pytest.mark.parametrize("row", find_tables("docs/results.md", "Exp.", "without", "with")[0], ids=lambda row: row["Exp."])
+def test_what_film_brings_is_that_of_the_evaluations_of_each_seed(row):
+    for said, name in zip((row["without"], row["with"]), WITHOUT_AND_WITH_FILM[row["Exp."]], strict=True):
+        seeds = read_evaluations(name)
+        left_out, trained = (re.findall(r"\d+\.\d", part) for part in (said.split("(")[0], said.partition("(")[2]))
+        assert [float(number) for number in left_out] == pytest.approx(
+            [s[row["type"]]["success_mean"] for s in seeds], abs=0.0501
+        )
+        if trained:
+            means = [np.mean([each["success_mean"] for each in types.values() if not each["zero_shot"]]) for types in seeds]
+            assert [float(number) for number in trained] == pytest.approx(means, abs=0.0501)
 
 
 @pytest.mark.parametrize("row", find_tables("docs/results.md", "arms of each type")[0], ids=lambda row: row["policy"])
