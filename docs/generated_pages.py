@@ -1,7 +1,7 @@
 """Pages of the site that are written by nobody: mkdocs runs this file as a hook.
 
-The home page is README.md, that of the robots `robots/README.md`, the configuration reference follows from the dataclasses in `hcp_jax/config/`, and the figures and
-tables under `results/` are published beside the pages that point to them.
+The home page is README.md, that of the robots `robots/README.md`, the configuration reference follows from the dataclasses in
+`hcp_jax/config/`, and the figures and tables under `results/` are published beside the pages that point to them.
 """
 
 import dataclasses

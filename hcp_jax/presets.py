@@ -179,6 +179,12 @@ def quick_reacher(name: str, left_out: str, **changes) -> Config:
     return arm(name, "reacher", "chain_fk", left_out=left_out, joint_slots="aligned", **(schedule | changes))
 
 
+def film_reacher(name: str, left_out: str, **changes) -> Config:
+    """`quick_reacher` with FiLM. `changes` are fields of `Config`."""
+    config = quick_reacher(name, left_out, **changes)
+    return dataclasses.replace(config, ddpg=dataclasses.replace(config.ddpg, network="film"))
+
+
 def aligned_peg(name: str, **changes) -> Config:
     """HCP-E on the peg: Jacobians and aligned joints. `changes` are those of `arm`."""
     return arm(name, "peg_insertion", "chain_fk+jacobian", joint_slots="aligned", **changes)

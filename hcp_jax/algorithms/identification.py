@@ -49,7 +49,10 @@ def standardize_embedding(params: dict) -> dict:
     parts = params["network"]["params"]
     first = parts["forward_model"]["hidden_0"]
     rows = first["kernel"][-size:]  # v_h is the last of the model's inputs
-    first = {"kernel": first["kernel"].at[-size:].set(rows * std[:, None]), "bias": first["bias"] + mean @ rows}
+    first = {
+        "kernel": first["kernel"].at[-size:].set(rows * std[:, None]),
+        "bias": first["bias"] + jnp.matmul(mean, rows, precision="highest"),
+    }
     forward_model = parts["forward_model"] | {"hidden_0": first}
     network = params["network"] | {"params": parts | {"forward_model": forward_model}}
     return {"network": network, "embedding": (embedding - mean) / std}

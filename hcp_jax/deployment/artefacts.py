@@ -63,7 +63,8 @@ def export_policy(
         jitted = jax.jit(policy.function)
         exported = jax.export.export(jitted, platforms=PLATFORMS)(jax.ShapeDtypeStruct((size,), np.float32))
         graph = to_onnx(policy.function, size, INPUT, OUTPUT)
-    observation = example_observation(run.config.task, robot, size)
+        observation = example_observation(run.config.task, robot, size)
+        torque = np.asarray(jitted(observation))
     description = {
         "format": _FORMAT,
         **describe_source(run.config, folder, iteration),
@@ -74,7 +75,7 @@ def export_policy(
         "input": describe_input(policy),
         "output": describe_output(policy, robot),
         **describe_arm_task(run.config, robot),
-        "example": {INPUT: observation.tolist(), OUTPUT: np.asarray(jitted(observation)).tolist()},
+        "example": {INPUT: observation.tolist(), OUTPUT: torque.tolist()},
     }
     files = {
         ONNX_FILE: graph.SerializeToString(),

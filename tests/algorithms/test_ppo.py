@@ -170,6 +170,8 @@ def test_standardising_the_embedding_leaves_the_predictions_as_they_were(key):
 
     np.testing.assert_allclose(predict(standardised), predict(params), atol=1e-5)
     assert np.abs(np.asarray(standardised["embedding"] - params["embedding"])).max() > 0.1
+    text = str(jax.make_jaxpr(standardize_embedding)(params))
+    assert text.count("dot_general[") == text.count("precision=(Precision.HIGHEST, Precision.HIGHEST)") > 0
 
 
 def test_the_same_seed_gives_the_same_parameters_and_another_seed_others():

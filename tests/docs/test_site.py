@@ -112,8 +112,8 @@ def anchor(heading: str) -> str:
 
 
 def test_links_of_a_checkout_lead_to_the_sites_own_pages(pages):
-    text = "[a](../README.md#b) [c](../results/d.json) [e](../hcp_jax/config) [f](../hcp_jax/policies) [g](h.md) [r](../robots/README.md)"
-    expected = "[a](index.md#b) [c](results/d.json) [e](configuration.md) [f](api/policies.md) [g](h.md) [r](robots.md)"
+    text = "[a](../README.md#b) [c](../results/d.json) [e](../hcp_jax/config) [f](../hcp_jax/policies) [g](../robots/README.md)"
+    expected = "[a](index.md#b) [c](results/d.json) [e](configuration.md) [f](api/policies.md) [g](robots.md)"
     assert pages.point_into_site(text) == expected
 
 
