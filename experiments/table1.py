@@ -6,9 +6,9 @@ import runpy
 from hcp_jax.config import Config
 
 NAMES = (
-    "reacher_aligned_leave_h",
+    "reacher_film_leave_h",
     "reacher_ddpg_leave_h",
-    "reacher_aligned_leave_e",
+    "reacher_film_leave_e",
     "reacher_ddpg_leave_e",
     "peg_film_leave_h",
     "peg_ddpg_leave_h",

@@ -43,9 +43,8 @@ class Setting:
 
     @property
     def experiment_names(self) -> tuple[str, str]:
-        """The files in `experiments/` of HCP-E, with aligned joints, on the peg with Jacobians and FiLM, and of DDPG+HER."""
-        hcpe = "aligned" if self.prefix == "reacher" else "film"
-        return f"{self.prefix}_{hcpe}_leave_{self.left_out.lower()}", f"{self.prefix}_ddpg_leave_{self.left_out.lower()}"
+        """The files in `experiments/` of HCP-E, with aligned joints and FiLM, on the peg with Jacobians, and of DDPG+HER."""
+        return f"{self.prefix}_film_leave_{self.left_out.lower()}", f"{self.prefix}_ddpg_leave_{self.left_out.lower()}"
 
     def trains(self, name: str) -> bool:
         """Whether an experiment of this name is of this setting."""

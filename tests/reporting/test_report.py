@@ -209,7 +209,7 @@ def outcome(success: float, **changes) -> dict:
 def results(tiny_arms, tiny_config, tmp_path_factory) -> pathlib.Path:
     """A folder of results with little in it, but something of each kind."""
     folder = tmp_path_factory.mktemp("tiny") / "results"
-    reacher = dataclasses.replace(tiny_arms, name="reacher_aligned_leave_h")
+    reacher = dataclasses.replace(tiny_arms, name="reacher_film_leave_h")
     for seed in (0, 1):
         rows = [{"env_steps": n, "train_types_success": 10.0 * n + seed, "left_out_success": 5.0 * n} for n in (80, 160)]
         write_run(folder / "arms" / "runs" / f"{reacher.name}_s{seed}", dataclasses.replace(reacher, seed=seed), rows)
@@ -222,7 +222,7 @@ def results(tiny_arms, tiny_config, tmp_path_factory) -> pathlib.Path:
     single = {"final_distances": [0.01, 0.02, 0.4], "episode_lengths": [20, 30, 200]}
     records = folder / "arms" / "evaluations"
     write_json(
-        records / "reacher_aligned_leave_h_s0.json", evaluation("reacher_aligned_leave_h_s0", {"H": outcome(90.0, **single)})
+        records / "reacher_film_leave_h_s0.json", evaluation("reacher_aligned_leave_h_s0", {"H": outcome(90.0, **single)})
     )
     write_json(records / "reacher_ddpg_leave_h_s0.json", evaluation("reacher_ddpg_leave_h_s0", {"H": outcome(0.0)}))
     for low, high, success in ((0.01, 2.0, 99.0), (40.0, 50.0, 51.0)):
@@ -353,13 +353,13 @@ DAMAGED = {
         json.dumps(evaluation("a", {"H": outcome(0.0, final_distance_quantiles={"0.5": 0.1})})),
         "no field '0'",
     ),
-    "bytes": ("arms/evaluations/reacher_aligned_leave_h_s0.json", b"\xff\xfe\x00", "damaged"),
-    "a config cut off": ("arms/runs/reacher_aligned_leave_h_s0/config.json", "{", "damaged"),
+    "bytes": ("arms/evaluations/reacher_film_leave_h_s0.json", b"\xff\xfe\x00", "damaged"),
+    "a config cut off": ("arms/runs/reacher_film_leave_h_s0/config.json", "{", "damaged"),
     "a config of bytes": ("hopper/runs/hopper_none_s0/config.json", b"\xff\xfe\x00", "damaged"),
     "a config that is a list": ("hopper/runs/hopper_none_s0/config.json", "[]", "damaged"),
     "infinite steps": ("appendix.json", json.dumps([FULL_ROW | {"control_steps": np.inf}]), "infinity"),
     "metrics with a word": (
-        "arms/runs/reacher_aligned_leave_h_s1/metrics.csv",
+        "arms/runs/reacher_film_leave_h_s1/metrics.csv",
         "env_steps,train_types_success\n80,high\n",
         "high",
     ),
