@@ -87,6 +87,8 @@ def test_success_by_type_is_that_of_the_evaluations(row):
 
 
 WITHOUT_AND_WITH_FILM = {
+    "I": ("reacher_aligned_leave_h", "reacher_film_leave_h"),
+    "III": ("reacher_aligned_leave_e", "reacher_film_leave_e"),
     "V": ("peg_aligned_leave_h", "peg_film_leave_h"),
     "VII": ("peg_aligned_leave_e_masked", "peg_film_leave_e"),
     "IX": ("peg_aligned_leave_i", "peg_film_leave_i"),
