@@ -79,3 +79,7 @@ def test_what_no_table_can_be_made_of_is_said(finished_arms, panda_run, tiny_con
     (tmp_path / "config.json").write_text(json.dumps(to_dict(tiny_config)))
     with pytest.raises(ConfigError, match="a policy of hoppers"):
         make_catalogue_table([finished_arms, tmp_path])
+    other = json.loads((finished_arms / "config.json").read_text()) | {"task": "peg_insertion"}
+    (tmp_path / "config.json").write_text(json.dumps(other))
+    with pytest.raises(ConfigError, match="of peg_insertion, and .* is of reacher; expected one task"):
+        make_catalogue_table([finished_arms, tmp_path])

@@ -7,8 +7,8 @@ import pytest
 from hcp_jax.hardware.arm import REMOVED_JOINTS, TYPES, arm_spec, sample_hardware
 from hcp_jax.hardware.arm_pool import CHAIN_TEMPLATES, make_arm_pool, make_chain_pool
 from hcp_jax.hardware.chain import ChainError, read_chain
-from hcp_jax.hardware.pool import RobotPool, robots_path
-from hcp_jax.hardware.ranges import ArmRanges, RangeError, nominal_lengths
+from hcp_jax.hardware.pool import PoolError, RobotPool, robots_path
+from hcp_jax.hardware.ranges import ArmRanges, nominal_lengths
 
 
 def drawn_arm(task: str, robot_type: str) -> mujoco.MjSpec:
@@ -94,6 +94,11 @@ def test_a_robot_is_the_same_whatever_pool_it_stands_in():
         np.testing.assert_array_equal(large.hardware[name][rows], values)
 
 
+def test_there_are_no_more_robots_of_a_type_than_ids():
+    with pytest.raises(PoolError, match="10,001 arms of each type: expected at most 10,000"):
+        make_arm_pool("reacher", ArmRanges(), ("A", "B"), 10_001, seed=0)
+
+
 def test_ranges_of_zero_width_give_the_nominal_arm():
     exact = {f.name: (1.0, 1.0) if f.name == "mass_ratio" else (0.5, 0.5) for f in dataclasses.fields(ArmRanges)}
     ranges = nominal_lengths(ArmRanges(**exact))
@@ -125,8 +130,3 @@ def test_chains_that_do_not_fit_are_refused():
         read_chain(spec.compile())
     with pytest.raises(ChainError, match="'nowhere'"):
         read_chain(arm_spec("reacher", "I").compile(), "nowhere")
-
-
-def test_a_link_cannot_shrink_through_itself():
-    with pytest.raises(RangeError, match=r"ranges.l4=\(-0.3, 0.0\)"):
-        ArmRanges(l4=(-0.3, 0.0))
