@@ -81,5 +81,5 @@ def test_what_no_table_can_be_made_of_is_said(finished_arms, panda_run, tiny_con
         make_catalogue_table([finished_arms, tmp_path])
     other = json.loads((finished_arms / "config.json").read_text()) | {"task": "peg_insertion"}
     (tmp_path / "config.json").write_text(json.dumps(other))
-    with pytest.raises(ConfigError, match="of peg_insertion, and .* is of reacher; expected one task"):
+    with pytest.raises(ConfigError, match=r"of peg_insertion, and .* is of reacher; expected one task"):
         make_catalogue_table([finished_arms, tmp_path])
