@@ -255,6 +255,16 @@ def test_a_run_that_breaks_does_not_keep_a_sweep_from_the_others(error, tiny_con
     assert [path.name for path in (tmp_path / "runs").iterdir()] == ["tiny_s1"]
 
 
+def test_what_a_run_failed_with_is_said_though_the_user_interrupts_too(tiny_config, tmp_path, monkeypatch):
+    def run_experiment(config, folder, interrupt):
+        signal.raise_signal(signal.SIGINT)
+        raise OSError("no space left")
+
+    monkeypatch.setattr(sweeping, "run_experiment", run_experiment)
+    jobs = [(tiny_config, tmp_path / "a"), (tiny_config, tmp_path / "b")]
+    assert list(sweeping.run_here(jobs)) == [(jobs[0], "no space left")]
+
+
 def test_ctrl_c_in_a_runs_last_seconds_ends_the_sweep_after_it(tiny_config, tmp_path, monkeypatch):
     def run_experiment(config, folder, interrupt):
         folder.mkdir()
@@ -264,7 +274,7 @@ def test_ctrl_c_in_a_runs_last_seconds_ends_the_sweep_after_it(tiny_config, tmp_
 
     monkeypatch.setattr(sweeping, "run_experiment", run_experiment)
     jobs = [(dataclasses.replace(tiny_config, seed=seed), tmp_path / f"tiny_s{seed}") for seed in range(2)]
-    assert not list(sweeping.run_here(jobs))
+    assert list(sweeping.run_here(jobs)) == [(jobs[0], None)]
     assert [path.name for path in tmp_path.iterdir()] == ["tiny_s0"]
 
 

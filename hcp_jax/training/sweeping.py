@@ -44,14 +44,13 @@ def run_here(jobs: Sequence[Job]) -> Iterator[tuple[Job, str | None]]:
     """
     with loop.Interrupt().installed() as interrupt:
         for job in jobs:
-            error = None
             try:
-                run_experiment(*job, interrupt)
-            except (PhysicsOverflowError, NonFiniteError, UserError, OSError) as raised:
-                error = one_line(raised)
+                if not run_experiment(*job, interrupt):
+                    yield job, None
+            except (PhysicsOverflowError, NonFiniteError, UserError, OSError) as error:
+                yield job, one_line(error)
             if interrupt.requested:
                 return
-            yield job, error
 
 
 def run_on_ray(jobs: Sequence[Job], worker: Worker, address: str, cpus_per_run: int) -> Iterator[tuple[Job, str | None]]:
