@@ -37,14 +37,13 @@ def make_catalogue_table(
             trained on one of `names`, or two runs were on the same.
         RunFolderError, CheckpointError: a policy cannot be read.
     """
-    tasks = [read_config(policy).task for policy in (*policies, *fine_tuned)]
-    for policy, task in zip((*policies, *fine_tuned), tasks, strict=True):
+    first = read_config(policies[0]).task
+    for policy in (*policies, *fine_tuned):
+        task = read_config(policy).task
         if task == "hopper":
             raise ConfigError(f"{policy}: a policy of hoppers; expected one of arms")
-        if task != tasks[0]:
-            raise ConfigError(
-                f"{policy}: of {task}, and {policies[0]} is of {tasks[0]}; expected one task, with the same goals"
-            )
+        if task != first:
+            raise ConfigError(f"{policy}: of {task}, and {policies[0]} is of {first}; expected one task, with the same goals")
     names = sorted(names or catalogue_names())
     for name in names:
         if name not in catalogue_names():
