@@ -58,12 +58,11 @@ def export_policy(
     robot = choose_robot(run, robot_name, base, tip)
     iteration, state = load_policy(folder, run, best)
     policy = make_robot_policy(run, state, robot)
-    task, size = run.make_env(robot.pool).task, len(policy.observation)
+    task, observation = run.make_env(robot.pool).task, example_observation(run.config.task, robot, len(policy.observation))
     with jax.default_matmul_precision("highest"):
         jitted = jax.jit(policy.function)
-        exported = jax.export.export(jitted, platforms=PLATFORMS)(jax.ShapeDtypeStruct((size,), np.float32))
-        graph = to_onnx(policy.function, size, INPUT, OUTPUT)
-        observation = example_observation(run.config.task, robot, size)
+        exported = jax.export.export(jitted, platforms=PLATFORMS)(jax.ShapeDtypeStruct(observation.shape, np.float32))
+        graph = to_onnx(policy.function, len(observation), INPUT, OUTPUT)
         torque = np.asarray(jitted(observation))
     description = {
         "format": _FORMAT,
