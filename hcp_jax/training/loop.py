@@ -115,6 +115,9 @@ def _run(
         say(f"resuming at {iteration * run.config.batch_size:,} steps")
     elif resume:
         say("the run ended before its first checkpoint: starting again")
+    if iteration > run.num_iterations:
+        done, total = iteration * run.config.batch_size, run.config.total_env_steps
+        raise run_folder.RunFolderError(f"--config.total_env_steps={total}: {folder} is at {done:,} steps; expected no fewer")
     if resume:
         do_in_main(lambda: run_folder.write_changes(folder, run.config))
     return TrainingLoop(run, folder, checkpoints, iteration).run(state, interrupt)

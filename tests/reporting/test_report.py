@@ -221,9 +221,7 @@ def results(tiny_arms, tiny_config, tmp_path_factory) -> pathlib.Path:
         write_run(folder / "arms" / "runs" / f"{tuned.name}_s0", tuned, rows)
     single = {"final_distances": [0.01, 0.02, 0.4], "episode_lengths": [20, 30, 200]}
     records = folder / "arms" / "evaluations"
-    write_json(
-        records / "reacher_film_leave_h_s0.json", evaluation("reacher_film_leave_h_s0", {"H": outcome(90.0, **single)})
-    )
+    write_json(records / "reacher_film_leave_h_s0.json", evaluation("reacher_film_leave_h_s0", {"H": outcome(90.0, **single)}))
     write_json(records / "reacher_ddpg_leave_h_s0.json", evaluation("reacher_ddpg_leave_h_s0", {"H": outcome(0.0)}))
     for low, high, success in ((0.01, 2.0, 99.0), (40.0, 50.0, 51.0)):
         record = evaluation("low_s0", {"I": outcome(success, **single)}, ranges={"damping": [low, high]})

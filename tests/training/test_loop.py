@@ -192,6 +192,13 @@ def test_a_run_goes_on_from_its_folder_alone_and_may_be_given_more_steps(finishe
     ]
 
 
+def test_a_run_is_not_given_fewer_steps_than_it_has_done(finished_run, tiny_config, tmp_path):
+    folder = shutil.copytree(finished_run, tmp_path / "run")
+    with pytest.raises(loop.run_folder.RunFolderError, match=r"total_env_steps=256: .*run is at 512 steps; expected no fewer"):
+        loop.train(dataclasses.replace(tiny_config, total_env_steps=256), folder, resume=True)
+    assert loop.run_folder.read_config(folder).total_env_steps == 512
+
+
 def test_heldout_robots_do_not_depend_on_the_training_seed(tiny_config):
     one, other = (loop.make_experiment(dataclasses.replace(tiny_config, seed=seed)) for seed in (0, 1))
     jax.tree.map(np.testing.assert_array_equal, one.heldout_pool, other.heldout_pool)
