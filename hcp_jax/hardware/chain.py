@@ -213,11 +213,9 @@ def _composite_inertia(model: mujoco.MjModel, data: mujoco.MjData, bodies: list[
     position, rotation = frame
     moments, axes = np.linalg.eigh(rotation.T @ tensor @ rotation)
     order = np.argsort(-moments)  # MuJoCo's order
-    axes, moments = axes[:, order], moments[order]
+    axes = axes[:, order]
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
-    # Of flat bodies the largest moment is the sum of the others, and MuJoCo takes one that rounding leaves above it for wrong.
-    moments[0] = min(moments[0], (moments[1] + moments[2]) * (1.0 - 1e-12))
-    return mass, rotation.T @ (com - position), _quat_of(axes), moments
+    return mass, rotation.T @ (com - position), _quat_of(axes), moments[order]
 
 
 def _frame_along(rotation: np.ndarray, axis: np.ndarray) -> np.ndarray:

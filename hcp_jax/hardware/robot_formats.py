@@ -147,7 +147,7 @@ def relax_inertias(spec: mujoco.MjSpec, notes: list[str]) -> None:
     """Lowers the largest moment of inertia of links where it is above the sum of the others by no more than rounding does.
 
     No body has such moments, and MuJoCo refuses them. A flat link's are at that limit, and the digits of a file, or of turning
-    its axes, leave them on either side of it.
+    its axes, leave them on either side of it. What is left below it is more than later sums and factors round by.
     """
     for body in spec.bodies[1:]:
         if not body.explicitinertial:
