@@ -40,6 +40,7 @@ def publish_runs(
 ) -> tuple[list[pathlib.Path], list[str]]:
     """Writes each run's newest policy to `policies` and copies its metrics to `out/runs`.
 
+    Repetitions, of seeds above 0, are published to be played, without their critics.
     All of `folders` are read before anything is written: one that cannot be read leaves the results as they were.
 
     Returns:
@@ -52,13 +53,13 @@ def publish_runs(
     """
     for folder in folders:
         _check_replaceable(folder, policies / folder.name, out / "runs" / folder.name)
-    read = [(folder.name, *_read_run(folder)) for folder in folders]
+    read = [(folder.name, *_read_run(folder), read_config(folder).seed == 0) for folder in folders]
     lines = [f"{out}/runs, {policies}: {', '.join(folder.name for folder in folders)}"] if folders else []
-    for name, files, state in read:
+    for name, files, state, critic in read:
         _write_files(policies / name, {key: files[key] for key in files if key not in (TIMING_FILE, METRICS_FILE)})
         path = policies / name / POLICY_FILE
         before = path.read_bytes() if path.exists() else None
-        write_policy(policies / name, state)
+        write_policy(policies / name, state, critic)
         if before not in (None, path.read_bytes()):
             stale = [*(out / "evaluations").glob(f"{name}.json"), *(out / "evaluations").glob(f"{name}_*.json")]
             lines += [f"{record}: of the policy that {policies / name} held before; evaluate it anew" for record in stale]

@@ -15,10 +15,17 @@ from hcp_jax.experiment.base import Experiment, TrainingState
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import CheckpointError, Checkpoints, check_architecture, leaf_name
 
+CRITIC = "critic"  # of DDPG's networks the one that is not played
 
-def write_policy(folder: pathlib.Path, state: TrainingState) -> pathlib.Path:
-    """Writes `policy.msgpack`: the kernels of networks as float16, the rest as float32. Returns its path."""
+
+def write_policy(folder: pathlib.Path, state: TrainingState, critic: bool = True) -> pathlib.Path:
+    """Writes `policy.msgpack`: the kernels of networks as float16, the rest as float32. Returns its path.
+
+    Without the critic of DDPG, which is half of the file, a policy plays as before, and no training starts from it.
+    """
     content = jax.device_get(flax.serialization.to_state_dict(state.published()))
+    if not critic:
+        content["params"].pop(CRITIC, None)
     rounded = jax.tree.map(lambda leaf, half: leaf.astype(np.float16) if half else leaf, content, mark_kernels(content))
     path = folder / run_folder.POLICY_FILE
     path.write_bytes(flax.serialization.msgpack_serialize(rounded))
@@ -26,24 +33,27 @@ def write_policy(folder: pathlib.Path, state: TrainingState) -> pathlib.Path:
 
 
 def read_policy(folder: pathlib.Path, template: TrainingState) -> TrainingState:
-    """`template`, a state of arrays or of their shapes, with the policy put in.
+    """`template`, a state of arrays or of their shapes, with the policy put in; of one without its critic `params` has none.
 
     Raises:
         CheckpointError: the file is damaged, was written by another version, or is of another architecture than `template`.
     """
-    path, empty = folder / run_folder.POLICY_FILE, template.published()
+    path = folder / run_folder.POLICY_FILE
     content = path.read_bytes()
     try:
         fields = flax.serialization.msgpack_restore(content)
     except Exception as error:  # flax and msgpack raise many kinds for damaged files
         raise CheckpointError(f"{path}: damaged ({type(error).__name__})") from error
-    if not isinstance(fields, dict) or fields.keys() != empty.keys():
+    expected = template.published().keys()
+    if not isinstance(fields, dict) or fields.keys() != expected:
         held = ", ".join(map(str, fields)) if isinstance(fields, dict) else type(fields).__name__
-        raise CheckpointError(f"{path}: holds {held}, not {', '.join(empty)}: of another version; collect its run anew")
+        raise CheckpointError(f"{path}: holds {held}, not {', '.join(expected)}: of another version; collect its run anew")
+    if isinstance(fields["params"], dict) and CRITIC not in fields["params"]:
+        template = template.replace(params={name: leaf for name, leaf in template.params.items() if name != CRITIC})
     shapes = {leaf_name(path): np.shape(leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(fields)}
     check_architecture(shapes, template, str(path))
     try:
-        policy = flax.serialization.from_state_dict(empty, jax.tree.map(_widen, fields))
+        policy = flax.serialization.from_state_dict(template.published(), jax.tree.map(_widen, fields))
     except (ValueError, TypeError) as error:
         raise CheckpointError(f"{path}: another architecture ({one_line(error)})") from error
     return template.with_published(policy)

@@ -15,7 +15,7 @@ from hcp_jax.experiment.base import TrainingState
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import CheckpointError
-from hcp_jax.training.policy_file import load_policy
+from hcp_jax.training.policy_file import CRITIC, load_policy
 
 
 def load_init(config: Config) -> Callable[[Any, TrainingState], TrainingState]:
@@ -26,7 +26,8 @@ def load_init(config: Config) -> Callable[[Any, TrainingState], TrainingState]:
     `all`; every robot's own v_h is new.
 
     Raises:
-        RunFolderError, CheckpointError: that run cannot be read, or its hidden layers do not fit `config`.
+        RunFolderError, CheckpointError: that run cannot be read, its hidden layers do not fit `config`, or it is a policy that
+            was published without its critic.
     """
     folder = pathlib.Path(config.init)
     source_config = run_folder.read_config(folder)
@@ -38,6 +39,8 @@ def load_init(config: Config) -> Callable[[Any, TrainingState], TrainingState]:
     if config.encoding == "embedding" and len(identified) > 1:
         raise CheckpointError(f"init={config.init}: its v_h was learned in another way (embedding.identify_steps)")
     source = load_policy(folder, make_experiment(source_config))[1]
+    if config.algorithm == "ddpg" and CRITIC not in source.params:
+        raise CheckpointError(f"init={config.init}: published without its critic; start from seed 0 of it, or from a run folder")
     start = _start_ppo if config.algorithm == "ppo" else _start_ddpg
     return lambda run, state: start(source, state, config.init_layers == "all")
 

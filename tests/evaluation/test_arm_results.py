@@ -95,6 +95,8 @@ def test_a_run_that_is_collected_later_is_added_to_those_before(results, finishe
     collect.main([str(tmp_path / "runs"), "--out", str(tmp_path / "results")])
     (row,) = json.loads((tmp_path / "results" / "arms" / "summary.json").read_text())
     assert row["seeds"] == [0, 1]
+    sizes = [(tmp_path / "results" / "policies" / f"arms_s{seed}" / "policy.msgpack").stat().st_size for seed in (0, 1)]
+    assert sizes[1] < 0.7 * sizes[0], "a repetition is published without its critic"
 
 
 def test_a_run_of_other_settings_does_not_replace_a_published_one(results, finished_arms, tmp_path, capsys):

@@ -18,7 +18,7 @@ from hcp_jax.training import loop, warm_start
 from hcp_jax.training.checkpoint import CheckpointError, Checkpoints
 from hcp_jax.training.loop import Interrupt, TrainingLoop
 from hcp_jax.training.metrics import read_rows
-from hcp_jax.training.policy_file import load_policy
+from hcp_jax.training.policy_file import load_policy, write_policy
 from hcp_jax.training.warm_start import load_init
 
 
@@ -314,6 +314,13 @@ def test_arms_start_from_the_mean_of_the_actors(finished_arms, tiny_arms, monkey
     state = load_init(config)(run, run.init_state())
     for actor in (state.params["actor"], state.target_params["actor"], state.average_actor):
         jax.tree.map(np.testing.assert_array_equal, actor, mean)
+
+
+def test_arms_do_not_start_from_a_policy_that_was_published_without_its_critic(finished_arms, tiny_arms, tmp_path):
+    shutil.copy(finished_arms / "config.json", tmp_path)
+    write_policy(tmp_path, load_policy(finished_arms, loop.make_experiment(tiny_arms))[1], critic=False)
+    with pytest.raises(CheckpointError, match="published without its critic"):
+        load_init(dataclasses.replace(tiny_arms, init=str(tmp_path)))
 
 
 def test_hoppers_do_not_start_from_an_arms_run(finished_arms, tiny_config):

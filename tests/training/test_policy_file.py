@@ -24,6 +24,26 @@ def test_a_published_policy_has_one_actor_and_it_is_the_mean(trained, tmp_path):
     assert len(kernels) == 1
 
 
+def test_a_policy_without_its_critic_is_smaller_and_plays_as_before(trained, tiny_arms, tmp_path):
+    learner = make_experiment(tiny_arms).learner
+    whole = learner.policy(read_policy(write_policy(tmp_path, trained).parent, trained))
+    size = (tmp_path / "policy.msgpack").stat().st_size
+    path = write_policy(tmp_path, trained, critic=False)
+    alone = learner.policy(read_policy(tmp_path, trained))
+    assert path.stat().st_size < 0.7 * size
+    assert whole[0].keys() - alone[0].keys() == {"critic"}
+    jax.tree.map(np.testing.assert_array_equal, (alone[0]["actor"], alone[1]), (whole[0]["actor"], whole[1]))
+
+
+def test_a_policy_without_its_actor_is_refused(trained, tmp_path):
+    path = write_policy(tmp_path, trained, critic=False)
+    content = flax.serialization.msgpack_restore(path.read_bytes())
+    del content["params"]["actor"]
+    path.write_bytes(flax.serialization.msgpack_serialize(content))
+    with pytest.raises(CheckpointError, match="it has no params/actor"):
+        read_policy(tmp_path, trained)
+
+
 def test_a_policy_of_another_version_is_refused_by_what_it_holds(trained, tmp_path):
     path = write_policy(tmp_path, trained)
     content = flax.serialization.msgpack_restore(path.read_bytes())
