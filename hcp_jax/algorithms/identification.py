@@ -1,18 +1,41 @@
 """Identification of robots: a learned v_h, grounded in a forward model that predicts a robot's next observation.
 
 v_h and model learn together from what the robots do. Once they are done, v_h is standardised over the robots and stands still,
-so that a policy can learn from it as from a measured property of the hardware.
+so that a policy can learn from it as from a measured property of the hardware. The actor that robots are identified under
+makes room for another one then.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import optax
 from brax.training.acme import running_statistics
+from flax import struct
 
+# The parts of the network that act and are acted by; the forward model is none of them.
+ACTOR_PARTS = ("policy", "value_function", "log_std")
 # Bound on the forward model's standardised inputs and targets.
 MAX_VARIABLE = 5.0
+
+
+@struct.dataclass
+class Actor:
+    """A policy with its value function, and the observations that it was trained on. network: those parts of the params."""
+
+    network: Any
+    obs_statistics: running_statistics.RunningStatisticsState
+
+
+def get_actor(params: dict, obs_statistics: running_statistics.RunningStatisticsState) -> Actor:
+    """The actor in `params`."""
+    return Actor({name: params["network"]["params"][name] for name in ACTOR_PARTS}, obs_statistics)
+
+
+def put_actor(actor: Actor, network: dict) -> dict:
+    """`network` with that actor's policy and value function."""
+    return {"params": network["params"] | actor.network}
 
 
 def forward_model_variables(obs: jax.Array, next_obs: jax.Array) -> jax.Array:

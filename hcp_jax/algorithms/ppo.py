@@ -23,8 +23,11 @@ from flax import struct
 
 from hcp_jax.algorithms.guard import Skipped, apply_update, init_skipped
 from hcp_jax.algorithms.identification import (
+    Actor,
     forward_model_variables,
+    get_actor,
     prediction_loss,
+    put_actor,
     standardize_embedding,
 )
 from hcp_jax.algorithms.losses import clipped_surrogate, clipped_value_loss
@@ -82,7 +85,7 @@ class PPOState:
 
     iteration: jax.Array
     params: Any
-    reserve: "Actor | None"
+    reserve: Actor | None
     opt_state: Any
     obs_statistics: running_statistics.RunningStatisticsState
     model_statistics: running_statistics.RunningStatisticsState
@@ -102,15 +105,6 @@ class PPOState:
         return self.replace(**content)
 
 
-@struct.dataclass
-class Actor:
-    """A policy with its value function, and the observations that it was trained on. network: those parts of the params."""
-
-    network: Any
-    obs_statistics: running_statistics.RunningStatisticsState
-
-
-ACTOR_PARTS = ("policy", "value_function", "log_std")
 LOSS_METRICS = ("policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "prediction_loss")
 SUMS = (*LOSS_METRICS, "iterations", "episodes", "episode_return", "episode_length", "value_error", "target_variance")
 
@@ -364,13 +358,3 @@ class PPO:
             "clip_fraction": jnp.mean((jnp.abs(jnp.exp(log_ratio) - 1.0) > config.clip_eps).astype(jnp.float32)),
         }
         return policy_loss + config.value_cost * value_loss - config.entropy_cost * entropy, metrics
-
-
-def get_actor(params: Params, obs_statistics: running_statistics.RunningStatisticsState) -> Actor:
-    """The actor in `params`."""
-    return Actor({name: params["network"]["params"][name] for name in ACTOR_PARTS}, obs_statistics)
-
-
-def put_actor(actor: Actor, network: dict) -> dict:
-    """`network` with that actor's policy and value function."""
-    return {"params": network["params"] | actor.network}

@@ -3,6 +3,7 @@
 import pathlib
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
 
@@ -18,12 +19,16 @@ def knn_r2(embedding: np.ndarray, target: np.ndarray, neighbours: int = 5, folds
     return float(1.0 - np.mean((target - predicted) ** 2) / np.var(target))
 
 
+def scatter_embedding(axes: Axes, embedding: np.ndarray, mass: np.ndarray) -> None:
+    """A 2-D embedding [N, 2], coloured by mass [N] in kg."""
+    points = axes.scatter(*embedding.T, c=mass, s=8, cmap="viridis", linewidths=0)
+    axes.figure.colorbar(points, label="torso mass [kg]")
+    axes.set_xlabel("v_h, first number")
+    axes.set_ylabel("v_h, second number")
+
+
 def plot_embedding(embedding: np.ndarray, mass: np.ndarray, path: pathlib.Path) -> None:
-    """Scatter of a 2-D embedding [N, 2], coloured by mass [N] in kg."""
+    """Writes `scatter_embedding` to an image file."""
     figure = Figure(figsize=(6, 4.8), layout="constrained")
-    axes = figure.subplots()
-    points = axes.scatter(*embedding.T, c=mass, s=10, cmap="viridis")
-    figure.colorbar(points, label="torso mass [kg]")
-    axes.set_xlabel("v_h[0]")
-    axes.set_ylabel("v_h[1]")
+    scatter_embedding(figure.subplots(), embedding, mass)
     figure.savefig(path, dpi=130)

@@ -12,8 +12,8 @@ import jax
 import jax.numpy as jnp
 import optax
 
-from hcp_jax.algorithms.identification import forward_model_variables, prediction_loss
-from hcp_jax.algorithms.ppo import PPO, PPOState, put_actor
+from hcp_jax.algorithms.identification import forward_model_variables, prediction_loss, put_actor
+from hcp_jax.algorithms.ppo import PPO, PPOState
 from hcp_jax.config import ConfigError
 from hcp_jax.envs.base import PoolEnv
 from hcp_jax.experiment.hopper import HopperExperiment

@@ -9,7 +9,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from hcp_jax.algorithms.ppo import PPO, Params, PPOState, get_actor, put_actor
+from hcp_jax.algorithms.identification import get_actor, put_actor
+from hcp_jax.algorithms.ppo import PPO, Params, PPOState
 from hcp_jax.config import Config, HopperConfig, HopperPoolConfig
 from hcp_jax.devices import copy_tree, replicate
 from hcp_jax.envs.base import PoolEnv

@@ -4,13 +4,14 @@ import pathlib
 
 import numpy as np
 
+from hcp_jax.evaluation.embedding import scatter_embedding
 from hcp_jax.evaluation.files import naming, number, optional_number, read_json
 from hcp_jax.evaluation.groups import label_groups
 from hcp_jax.evaluation.hopper_results import name_start
 from hcp_jax.evaluation.summary import RETURNS, deviation_over_seeds
 from hcp_jax.reporting.curves import SPREAD, draw_groups
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
-from hcp_jax.reporting.plots import draw_embedding
+from hcp_jax.reporting.plots import render
 from hcp_jax.reporting.published import Published
 
 LABEL = "return of one episode"
@@ -155,7 +156,8 @@ def make_embedding(published: Published) -> Item:
                 raise ValueError(f"{len(points)} rows of embedding, {len(mass)} of torso_mass")
             r2 = f"R\N{SUPERSCRIPT TWO} {number(record['r2']):.4f}, cross-validated"
             text += f" The mean mass of the {int(record['neighbours'])} nearest others predicts the mass with {r2}."
-        figures = (Figure(draw_embedding(points, mass), f"Each of {len(points)} dots is a hopper.", (published.show(path),)),)
+        picture = render(lambda axes: scatter_embedding(axes, points, mass), (5.0, 3.9))
+        figures = (Figure(picture, f"Each of {len(points)} dots is a hopper.", (published.show(path),)),)
     train = "python -m hcp_jax.train --config experiments/hopper_embedding.py --out runs/hopper/hopper_embedding_s0"
     return Item("Embedding", text, (), figures, (train, COLLECT_COMMAND))
 

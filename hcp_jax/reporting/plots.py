@@ -171,15 +171,3 @@ def draw_box(axes: Axes, place: int, quantiles: Sequence[float], colour: str) ->
     box = {"whislo": low, "q1": first, "med": median, "q3": third, "whishi": high, "fliers": [highest]}
     line, ring = {"color": colour}, {"markeredgecolor": colour, "marker": "o", "markersize": 4}
     axes.bxp([box], [place], widths=0.5, boxprops=line, medianprops=line, whiskerprops=line, capprops=line, flierprops=ring)
-
-
-def draw_embedding(embedding: np.ndarray, mass: np.ndarray) -> str:
-    """Scatter of a 2-D embedding [N, 2], coloured by mass [N] in kg."""
-
-    def draw(axes: Axes) -> None:
-        points = axes.scatter(*embedding.T, c=mass, s=8, cmap="viridis", linewidths=0)
-        axes.figure.colorbar(points, label="torso mass [kg]")
-        axes.set_xlabel("v_h, first number")
-        axes.set_ylabel("v_h, second number")
-
-    return render(draw, (5.0, 3.9))

@@ -8,7 +8,8 @@ import jax
 import jax.numpy as jnp
 
 from hcp_jax.algorithms.ddpg import DDPGState
-from hcp_jax.algorithms.ppo import PPOState, get_actor, put_actor
+from hcp_jax.algorithms.identification import get_actor, put_actor
+from hcp_jax.algorithms.ppo import PPOState
 from hcp_jax.config import Config
 from hcp_jax.devices import copy_tree
 from hcp_jax.experiment.base import TrainingState
@@ -40,7 +41,7 @@ def load_init(config: Config) -> Callable[[Any, TrainingState], TrainingState]:
         raise CheckpointError(f"init={config.init}: its v_h was learned in another way (embedding.identify_steps)")
     source = load_policy(folder, make_experiment(source_config))[1]
     if config.algorithm == "ddpg" and CRITIC not in source.params:
-        raise CheckpointError(f"init={config.init}: published without its critic; start from seed 0 of it, or from a run folder")
+        raise CheckpointError(f"init={config.init}: published without its critic; start from seed 0 or a run folder")
     start = _start_ppo if config.algorithm == "ppo" else _start_ddpg
     return lambda run, state: start(source, state, config.init_layers == "all")
 

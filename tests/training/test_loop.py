@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hcp_jax import train
-from hcp_jax.algorithms.ppo import get_actor
+from hcp_jax.algorithms.identification import get_actor
 from hcp_jax.config import to_dict
 from hcp_jax.evaluation.summary import read_wall_seconds
 from hcp_jax.training import loop, warm_start
