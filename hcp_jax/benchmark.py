@@ -11,14 +11,13 @@ from hcp_jax import command_line, presets
 from hcp_jax.benchmarks.learner import benchmark_learner
 from hcp_jax.benchmarks.physics import ROWS, benchmark_physics
 from hcp_jax.benchmarks.scale import benchmark_scale
-from hcp_jax.benchmarks.training import SUCCESS_ROWS, TRAINING_ROWS, benchmark_success, benchmark_training
+from hcp_jax.benchmarks.training import PEERS, SUCCESS_ROWS, benchmark_success, benchmark_training
 from hcp_jax.config import Config, ConfigError
 from hcp_jax.evaluation.files import write_json
 from hcp_jax.physics.build import resolve_physics
 from hcp_jax.training.run_folder import describe_environment
 
 SUBJECTS = ("physics", "learner", "train", "scale")
-ROWS_OF = {"physics": ROWS, "train": TRAINING_ROWS}
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -54,7 +53,8 @@ def main(arguments: list[str] | None = None) -> None:
             config = command_line.apply_overrides(presets.arm("reacher", "reacher", "chain_fk", left_out="H"), overrides)
         if options.to_success is not None and options.subject != "train":
             raise ConfigError(f"--to-success: goes with train, not {options.subject}")
-        allowed = ROWS_OF.get(options.subject, ()) if options.to_success is None else SUCCESS_ROWS
+        rows_of = {"physics": ROWS, "train": ("hcp_jax", *PEERS[config.task])}
+        allowed = rows_of.get(options.subject, ()) if options.to_success is None else SUCCESS_ROWS
         for row in options.rows or ():
             if row not in allowed:
                 subject = options.subject + (" --to-success" if options.to_success is not None else "")
@@ -86,7 +86,7 @@ def measure(options: argparse.Namespace, config: Config) -> Iterable[dict]:
     if options.subject == "scale":
         return benchmark_scale(config, options.sizes, options.seconds)
     if options.to_success is None:
-        return benchmark_training(config, options.rows or list(TRAINING_ROWS), options.seconds)
+        return benchmark_training(config, options.rows or ["hcp_jax", *PEERS[config.task]], options.seconds)
     return benchmark_success(config, options.rows or list(SUCCESS_ROWS), options.to_success, options.limit)
 
 

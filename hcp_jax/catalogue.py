@@ -41,19 +41,21 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def print_table(rows: list[dict]) -> None:
-    """One row per arm, a column for each policy, and their medians over the arms."""
+    """One row per arm, a column for each policy, and their medians over the arms that it was not trained on."""
     names = [pathlib.Path(part["policy"]).name for part in rows[0]["zero_shot"]]
     table = Table(title="success [%] on the goals of the task")
-    for head in ("arm", "goals in reach [%]", *(f"{name}, zero-shot" for name in names), "fine-tuned"):
+    for head in ("arm", "goals in reach [%]", *names, "fine-tuned"):
         table.add_column(head, justify="left" if head == "arm" else "right")
     for row in rows:
-        parts = [*row["zero_shot"], row["fine_tuned"] or {}]
-        values = [row["reachable_share"], *(part.get("success_mean") for part in parts)]
-        table.add_row(row["robot"], *("n/a" if value is None else f"{value:.1f}" for value in values))
+        shown = [f"{part['success_mean']:.1f}" + " (trained on it)" * part["trained"] for part in row["zero_shot"]]
+        tuned = f"{row['fine_tuned']['success_mean']:.1f}" if row["fine_tuned"] else "n/a"
+        table.add_row(row["robot"], f"{row['reachable_share']:.1f}", *shown, tuned)
     command_line.show(table)
     for column, name in enumerate(names):
-        median = np.median([row["zero_shot"][column]["success_mean"] for row in rows])
-        command_line.show(f"median zero-shot success: {median:.1f} %, {name}")
+        parts = [row["zero_shot"][column] for row in rows]
+        successes = [part["success_mean"] for part in parts if not part["trained"]]
+        if successes:
+            command_line.show(f"median zero-shot success: {np.median(successes):.1f} %, {name}")
 
 
 if __name__ == "__main__":

@@ -28,7 +28,6 @@ from hcp_jax.experiment.arm import ArmExperiment
 from hcp_jax.experiment.build import make_experiment
 
 PEERS = {"hopper": ("sb3-ppo", "brax-ppo"), "reacher": ("sb3-her",), "peg_insertion": ("sb3-her",)}
-TRAINING_ROWS = ("hcp_jax", "sb3-ppo", "brax-ppo", "sb3-her")
 SUCCESS_ROWS = ("hcp_jax", "sb3-her")
 NUM_SUBPROCESSES = 8
 _SB3_UNROLL, _SB3_BATCH = 2048, 64  # Stable-Baselines3's defaults
@@ -47,7 +46,7 @@ def benchmark_training(config: Config, rows: Sequence[str], seconds: float) -> I
 
     Args:
         config: the experiment; peers get its robots, networks' widths and gradient samples per step, otherwise their defaults.
-        rows: names out of `TRAINING_ROWS`; those of another task are left out.
+        rows: `hcp_jax`, and names out of `PEERS` of the task.
         seconds: shortest time of one measurement of ours; Stable-Baselines3 learns for at least that long, brax for three
             iterations.
 
@@ -57,12 +56,10 @@ def benchmark_training(config: Config, rows: Sequence[str], seconds: float) -> I
     Raises:
         UserError: a peer is not installed; nothing was measured.
     """
-    check_installed([name for name in rows if name in PEERS[config.task]])
+    check_installed(rows)
     for name in rows:
         if name == "hcp_jax":
             speed = benchmark_learner(config, seconds)[0]["control_steps_per_s"]
-        elif name not in PEERS[config.task]:
-            continue
         else:
             time_peer = {"sb3-ppo": time_sb3_ppo, "brax-ppo": time_brax_ppo, "sb3-her": time_sb3_her}[name]
             speed = time_peer(config, seconds)

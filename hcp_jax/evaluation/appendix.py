@@ -54,7 +54,8 @@ def make_appendix(results: pathlib.Path) -> list[dict]:
     for runs in group_evaluations(results):
         left_out = left_out_type(runs[0][2])
         experiment, _ = find_paper(runs[0][2], left_out)
-        for test_type in sorted(set.intersection(*(set(record["types"]) for _, record, _ in runs)) - {left_out}):
+        for test_type in sorted(set().union(*(record["types"] for _, record, _ in runs)) - {left_out}):
+            evaluated = [run for run in runs if test_type in run[1]["types"]]  # other templates may be of one seed alone
             paper = paper_by_type(experiment, left_out, test_type)
-            rows.append(make_row(runs, results, test_type, experiment, paper))
+            rows.append(make_row(evaluated, results, test_type, experiment, paper))
     return sort_rows(rows)

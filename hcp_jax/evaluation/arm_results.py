@@ -20,6 +20,8 @@ def collect_arms(folders: Sequence[pathlib.Path], results: pathlib.Path) -> list
     whose evaluations are there.
     """
     out = results / "arms"
+    for make_rows in (make_table1, make_appendix):
+        make_rows(results)  # a damaged evaluation is said before anything is written
     published, written = publish_runs(folders, out, results / "policies")
     if not published:
         return []

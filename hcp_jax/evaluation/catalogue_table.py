@@ -29,8 +29,8 @@ def make_catalogue_table(
     Returns:
         one row per arm, in alphabetical order: robot, joints, reachable_share of the goals, zero_shot (a list, as
         `policies`) and fine_tuned (None without such a run), trials, episodes_per_trial, physics, commit. Each of the two
-        holds success_mean and success_std over trials, reachable_success_mean, policy and control_steps. Success and shares
-        in percent.
+        holds success_mean and success_std over trials, reachable_success_mean, trained (whether the policy was, on that
+        arm), policy and control_steps. Success and shares in percent.
 
     Raises:
         ConfigError: a policy is of hoppers or of another task than the first, an arm is not in the catalogue, a run was not
@@ -88,4 +88,5 @@ def summarise(record: dict, name: str) -> dict:
     keys = ("success_mean", "success_std", "reachable_success_mean")
     values = {key: record["types"][name][key] for key in keys}
     rounded = {key: None if value is None else round(value, 2) for key, value in values.items()}
-    return rounded | {"policy": record["run"], "control_steps": record["checkpoint_env_steps"]}
+    trained = not record["types"][name]["zero_shot"]
+    return rounded | {"trained": trained, "policy": record["run"], "control_steps": record["checkpoint_env_steps"]}

@@ -61,10 +61,15 @@ def publish_runs(
         before = path.read_bytes() if path.exists() else None
         write_policy(policies / name, state, critic)
         if before not in (None, path.read_bytes()):
-            stale = [*(out / "evaluations").glob(f"{name}.json"), *(out / "evaluations").glob(f"{name}_*.json")]
-            lines += [f"{record}: of the policy that {policies / name} held before; evaluate it anew" for record in stale]
+            stale = [*find_records(out, name), *find_records(policies.parent / "rehearsal", name)]
+            lines += [f"{record}: of the policy that {policies / name} held before; measure it anew" for record in stale]
         _write_files(out / "runs" / name, files)
     return find_runs(out / "runs"), lines
+
+
+def find_records(folder: pathlib.Path, policy: str) -> list[pathlib.Path]:
+    """What was measured of a published policy: `POLICY.json` and `POLICY_*.json` in `folder` and the folders in it."""
+    return sorted(path for path in folder.rglob(f"{policy}*.json") if f"{path.stem}_".startswith(f"{policy}_"))
 
 
 def _check_replaceable(folder: pathlib.Path, policy: pathlib.Path, run: pathlib.Path) -> None:

@@ -1,6 +1,7 @@
 """One row per algorithm from run folders: what `results/*/summary.json` holds."""
 
 import dataclasses
+import functools
 import pathlib
 from collections.abc import Sequence
 
@@ -118,12 +119,12 @@ class SeedCurve:
 
 
 def average_curves(curves: Sequence[np.ndarray]) -> SeedCurve | None:
-    """Curves of several seeds [E, 2] as one, as far as all of them go; None if one of them has no point."""
-    length = min(len(curve) for curve in curves)
-    if not length:
+    """Curves of several seeds [E, 2] as one, of the steps at which all of them were evaluated; None if there are none."""
+    steps = functools.reduce(np.intersect1d, (curve[:, 0] for curve in curves))
+    if not len(steps):
         return None
-    values = np.stack([curve[:length, 1] for curve in curves])
-    return SeedCurve(curves[0][:length, 0], values.mean(axis=0), values.min(axis=0), values.max(axis=0), len(curves))
+    values = np.stack([curve[np.isin(curve[:, 0], steps), 1] for curve in curves])
+    return SeedCurve(steps, values.mean(axis=0), values.min(axis=0), values.max(axis=0), len(curves))
 
 
 def steps_to_reach(folder: pathlib.Path, column: str, value: float) -> int | None:

@@ -9,6 +9,7 @@ from hcp_jax.config import ArmConfig, ArmPoolConfig, Config
 from hcp_jax.evaluation.files import naming, number, optional_number, read_json
 from hcp_jax.evaluation.groups import group_by_settings
 from hcp_jax.evaluation.summary import deviation_over_seeds, name_algorithm, read_run_commit, read_wall_seconds
+from hcp_jax.training.metrics import METRICS_FILE, read_rows
 from hcp_jax.training.run_folder import read_config
 
 # (task, hole moves, type left out): experiment of HCP-E (that of DDPG+HER is the next), mean and deviation of each [%].
@@ -60,14 +61,20 @@ def group_evaluations(results: pathlib.Path) -> Sequence[Runs]:
             record, config = read_json(path, dict), read_config(folder)
             assert isinstance(config.pool, ArmPoolConfig)
             with naming(path):
-                _check_record(record)
+                _check_record(record, folder)
                 if len(config.pool.left_out) == 1 and config.pool.left_out[0] in record["types"]:
                     runs.append((path.stem, record, config))
     return group_by_settings(runs, lambda run: run[2], lambda run: tuple(run[1][name] for name in _MEASURED))
 
 
-def _check_record(record: dict) -> None:
-    """Raises KeyError, TypeError or ValueError unless an evaluation's record has what tables are made of."""
+def _check_record(record: dict, run: pathlib.Path) -> None:
+    """Raises KeyError, TypeError or ValueError unless an evaluation's record has what tables are made of, and is of the policy
+    that the run in folder `run` ended with."""
+    if pathlib.PurePath(record["run"]).name != run.name:
+        raise ValueError(f"run={record['run']!r}: expected the policy {run.name}")
+    steps = int(read_rows(run / METRICS_FILE)[-1]["env_steps"])
+    if record["checkpoint_env_steps"] != steps:
+        raise ValueError(f"checkpoint_env_steps={record['checkpoint_env_steps']}: expected {steps}, where its run ends")
     for name in _MEASURED:
         if not isinstance(record[name], str):
             number(record[name])

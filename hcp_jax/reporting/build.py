@@ -19,8 +19,12 @@ INTRODUCTION = (
     "What hcp_jax measured, beside the figures of Hardware Conditioned Policies for Multi-Robot Transfer Learning (Chen, "
     "Murali, Gupta, NeurIPS 2018). Differences are ours minus the paper's, in points.\n\n"
     "HCP-E is given a vector v_h of a robot's hardware, HCP-I learns it, DDPG+HER and PPO see none. Of arms, chain is the "
-    "paper's v_h, the relative poses of a robot's joints; chain_fk is what its released code sees, the poses at the current "
-    "joint angles; chain_fk+jacobian adds how the joints move the end effector.\n\n"
+    "paper's v_h, the relative poses of a robot's joints; chain_fk has the poses at the current joint angles, which its "
+    "released code feeds in another form, and the end effector's offset from the goal; chain_fk+jacobian adds how the joints "
+    "move the end effector. none+goal_offset and none+end_effector see that offset, or the end effector's position, and no "
+    "v_h. With aligned joints an entry of observation and action is the same joint in every type, where the paper packs the "
+    "joints that an arm has; network film: v_h scales and shifts the hidden layers too. Of several HCP-E of one experiment "
+    "the first is the one in README's table.\n\n"
     "Every number and figure is read from the files that are named below it; the commands below an item make these files again."
 )
 

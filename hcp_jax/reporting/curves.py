@@ -106,7 +106,9 @@ def make_finetuning(published: Published, letter: str, name: str) -> Item:
     tables = (compare_to_scratch(lines[0].curve, lines[1].curve, files),) if is_pair else ()
     commands = (*train_commands([name, scratch_name]), RESULTS_COMMANDS[1])
     experiment = next(s.experiment for s in SETTINGS if s.prefix == "random_peg" and s.left_out == letter)
-    return Item(f"Type {letter}, from Exp. {roman(experiment)}", "", tables, figures, commands)
+    starts = dict.fromkeys(run.config.init for runs in groups for run in runs if run.config.init)
+    text = f"From {', '.join(starts)}." if starts else ""
+    return Item(f"Type {letter}, from Exp. {roman(experiment)}", text, tables, figures, commands)
 
 
 def compare_to_scratch(scratch: SeedCurve, pretrained: SeedCurve, sources: tuple[str, ...]) -> Table:

@@ -8,6 +8,7 @@ from hcp_jax.config import ArmConfig
 from hcp_jax.evaluation.appendix import PAPER_DAMPING
 from hcp_jax.evaluation.files import naming
 from hcp_jax.evaluation.records import Evaluation, Outcome, read_evaluation
+from hcp_jax.evaluation.summary import ALGORITHM_NAMES, BASELINES
 from hcp_jax.reporting.curves import make_curves, train_commands
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import Spread, draw_spreads
@@ -86,12 +87,13 @@ def make_damping_item(published: Published) -> Item:
     lines = []
     for damping in sorted({*PAPER_DAMPING, *(damping for damping, _ in records)}):
         evaluations = [evaluation for of_record, evaluation in records if of_record == damping]
-        lines += [line for evaluation in evaluations for line in damping_lines(damping, evaluation)]
-        if not evaluations:
-            cells = (name_range(damping), "", NOT_RUN, decimals(PAPER_DAMPING[damping]), "", "", "", "")
+        if damping in PAPER_DAMPING and not any(evaluation.encoding == "none" for evaluation in evaluations):
+            cells = (name_range(damping), "DDPG+HER", "I", NOT_RUN, decimals(PAPER_DAMPING[damping]), "", "", "", "")
             lines.append(Row(cells, "missing"))
-    columns = ("damping [N m s/rad]", "type", "ours [%]", "paper [%]", "difference", "mean episode length [steps]", "arms")
-    tables = (Table("Success by range of damping", (*columns, "policy"), "llrrrrrc", tuple(lines), files),)
+        lines += [line for evaluation in evaluations for line in damping_lines(damping, evaluation)]
+    columns = ("damping [N m s/rad]", "algorithm", "type", "ours [%]", "paper [%]", "difference")
+    columns += ("mean episode length [steps]", "arms", "policy")
+    tables = (Table("Success by range of damping", columns, "lllrrrrrc", tuple(lines), files),)
     figures = tuple(
         figure
         for label, take in (
@@ -121,16 +123,22 @@ def read_damping(published: Published) -> list[tuple[tuple[float, float], Evalua
     return sorted(records, key=lambda record: record[0])
 
 
+def name_evaluated(evaluation: Evaluation) -> str:
+    """The algorithm of an evaluated policy of arms."""
+    return ALGORITHM_NAMES.get(evaluation.encoding, BASELINES["ddpg"])
+
+
 def name_range(damping: tuple[float, float]) -> str:
     return f"{damping[0]:g} to {damping[1]:g}"
 
 
 def damping_lines(damping: tuple[float, float], evaluation: Evaluation) -> list[Row]:
-    """A row for each type of a record."""
-    lines, paper = [], PAPER_DAMPING.get(damping)
+    """A row for each type of a record, beside the paper's where it is of the paper's algorithm."""
+    lines, paper = [], PAPER_DAMPING.get(damping) if evaluation.encoding == "none" else None
     for robot_type, outcome in evaluation.types.items():
         cells = (
             name_range(damping),
+            name_evaluated(evaluation),
             robot_type,
             spread(outcome.success_mean, outcome.success_std if evaluation.trials > 1 else None),
             decimals(paper),
@@ -154,7 +162,8 @@ def draw_damping(
     spreads = []
     for damping, evaluation in records:
         for outcome in evaluation.types.values():
-            place = name_range(damping) + f"\n{evaluation.policy.rpartition('_')[2]}" * several
+            seed = evaluation.policy.rpartition("_")[2]
+            place = name_range(damping) + f"\n{name_evaluated(evaluation)}\n{seed}" * several
             spreads.append(spread_of(place, evaluation.encoding, outcome, take(outcome)))
     if label != DISTANCE:  # records without single episodes have quantiles of the distance alone
         spreads = [spread for spread in spreads if spread.values is not None]

@@ -76,17 +76,19 @@ def make_first_steps(published: Published) -> Item:
     paths, returns = sorted(folder.glob("*_first_steps.json")) if folder else [], {}
     for path in paths:
         with naming(path):
-            for name, outcome in read_json(path, dict)["sets"].items():
-                returns.setdefault(name_set(name), []).append(number(outcome["return_mean"]))
+            record = read_json(path, dict)
+            experiment = pathlib.PurePath(record["run"]).name.rpartition("_s")[0]
+            for name, outcome in record["sets"].items():
+                returns.setdefault((experiment, name_set(name)), []).append(number(outcome["return_mean"]))
     rows = tuple(
-        Row((steps, show_return(np.mean(values), deviation_over_seeds(values)), str(len(values))))
-        for steps, values in returns.items()
+        Row((steps, show_return(np.mean(values), deviation_over_seeds(values)), str(len(values)), experiment))
+        for (experiment, steps), values in returns.items()
     )
     caption = "Return of one episode: mean and sample standard deviation over seeds"
-    columns = ("v_h from", "return", "seeds")
-    tables = (Table(caption, columns, "lrr", rows, tuple(published.show(path) for path in paths)),) if rows else ()
+    columns = ("v_h from", "return", "seeds", "experiment")
+    tables = (Table(caption, columns, "lrrc", rows, tuple(published.show(path) for path in paths)),) if rows else ()
     text = (
-        "100 hoppers that the policy never saw, networks frozen. v_h is the one with which the forward model best predicts "
+        "Hoppers that the policy never saw, networks frozen. v_h is the one with which the forward model best predicts "
         "a hopper's own first control steps (8 ms each), or the mean of those trained on, or what those learned."
     )
     command = (

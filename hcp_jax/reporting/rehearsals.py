@@ -73,7 +73,7 @@ def _real(record: Rehearsal) -> Rehearsed:
 
 
 def _letter(record: Rehearsal) -> str:
-    return PAPER_POLICIES.get(record.policy.rpartition("_s")[0], "")
+    return PAPER_POLICIES.get(record.policy.rpartition("_s")[0], "") if record.robot == "sawyer" else ""
 
 
 def _order(record: Rehearsal) -> tuple[str, str]:

@@ -69,6 +69,7 @@ def make_table1(published: Published, rows: Sequence[TableRow]) -> Item:
             experiment = setting.experiment + number
             first = (roman(experiment), setting.left_out)
             measured = [row for row in rows if row.experiment == experiment]
+            measured.sort(key=lambda row: not row.policy[0].startswith(name))  # first the one that table1.py lists
             lines[setting.task] += [Row((*first, *measurements(row))) for row in measured]
             if not measured:
                 steps = describe_progress(published, name)

@@ -34,11 +34,6 @@ def test_gradient_samples_are_epochs_of_ppo_and_drawn_steps_of_ddpg():
     assert samples_per_step(REACHER) == 5 * 16 / (4 * 10)
 
 
-def test_rows_of_other_tasks_are_left_out():
-    assert not list(benchmark_training(REACHER, ["sb3-ppo", "brax-ppo"], seconds=0.01))
-    assert not list(benchmark_training(HOPPER, ["sb3-her"], seconds=0.01))
-
-
 @pytest.mark.slow
 def test_stable_baselines3_learns_on_our_worlds_beside_us():
     """pytest -m slow tests/benchmarks, with the extra `bench`"""
@@ -63,9 +58,10 @@ def test_the_time_to_success_ends_with_the_target_or_the_limit():
             "--rows=sb3-ppo: expected of train --to-success: hcp_jax, sb3-her",
         ),
         (["learner", "--to-success", "90"], "--to-success: goes with train, not learner"),
+        (["train", "--rows", "brax-ppo"], "--rows=brax-ppo: expected of train: hcp_jax, sb3-her"),
     ],
 )
-def test_rows_without_a_time_to_success_are_refused(arguments, expected, capsys):
+def test_rows_that_do_not_go_with_what_is_measured_are_refused(arguments, expected, capsys):
     with pytest.raises(SystemExit) as exit_info:
         benchmark.main(arguments)
     assert exit_info.value.code == 2

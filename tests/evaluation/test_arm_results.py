@@ -1,5 +1,4 @@
 import json
-import pathlib
 import shutil
 
 import pytest
@@ -10,8 +9,8 @@ from hcp_jax.evaluation.arm_sweeps import evaluate_arms
 from hcp_jax.evaluation.table1 import make_table1
 from hcp_jax.training.metrics import read_rows
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-MEASURED = {"checkpoint_env_steps": 1, "trials": 1, "robots_per_trial": 1, "physics": "native", "integrator": "rk4"}
+MEASURED = {"run": "arms_s0", "checkpoint_env_steps": 320, "trials": 1, "robots_per_trial": 1}
+MEASURED |= {"physics": "native", "integrator": "rk4"}
 
 
 @pytest.fixture(scope="module")
@@ -67,24 +66,60 @@ def test_table_1_averages_evaluations_of_equal_settings_and_steps_alone(results,
     (evaluations / "arms_s0.json").write_text(json.dumps(record))
     others = {
         "arms_s1": ({"seed": 1}, {}),
-        "arms_s2": ({"seed": 2}, {"checkpoint_env_steps": 160}),
+        "arms_s2": ({"seed": 2}, {"checkpoint_env_steps": 240}),
         "arms_s3": ({"seed": 3}, {"physics": "native-rk4", "integrator": "rk4"}),
         "wide_s0": ({"num_envs": 2 * config["num_envs"]}, {}),
     }
     for name, (change, measured) in others.items():
         shutil.copytree(run / "arms_s0", run / name)
         (run / name / "config.json").write_text(json.dumps(config | change))
+        if "checkpoint_env_steps" in measured:  # its training was cut off there
+            metrics = run / name / "metrics.csv"
+            metrics.write_text("".join(metrics.read_text().splitlines(keepends=True)[:-1]))
         record["types"]["H"]["success_mean"] = 20.0
+        record["run"] = name
         (evaluations / f"{name}.json").write_text(json.dumps(record | measured))
     rows = {tuple(row["policy"]): row for row in make_table1(folder)}
     assert {policies: row["control_steps"] for policies, row in rows.items()} == {
         ("arms_s0", "arms_s1"): 320,
-        ("arms_s2",): 160,
+        ("arms_s2",): 240,
         ("arms_s3",): 320,
         ("wide_s0",): 320,
     }
     both = rows["arms_s0", "arms_s1"]
     assert (both["success_mean"], both["success_std_over_seeds"]) == (15.0, 7.07), "the deviation is a sample's"
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"run": "runs/arms_s7"}, "run='runs/arms_s7': expected the policy arms_s0"),
+        ({"checkpoint_env_steps": 80}, "checkpoint_env_steps=80: expected 320, where its run ends"),
+    ],
+)
+def test_an_evaluation_of_another_policy_is_refused_before_anything_is_written(
+    change, expected, results, finished_arms, tmp_path, capsys
+):
+    shutil.copytree(results, tmp_path / "results")
+    shutil.copytree(finished_arms, tmp_path / "runs" / "arms_s1")
+    path = tmp_path / "results" / "arms" / "evaluations" / "arms_s0.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    with pytest.raises(SystemExit):
+        collect.main([str(tmp_path / "runs"), "--out", str(tmp_path / "results")])
+    assert expected in capsys.readouterr().err
+    assert not (tmp_path / "results" / "policies" / "arms_s1").exists()
+
+
+def test_a_type_that_one_seed_alone_was_evaluated_on_has_a_row_of_that_seed(results, tmp_path):
+    shutil.copytree(results, tmp_path / "results")
+    arms = tmp_path / "results" / "arms"
+    shutil.copytree(arms / "runs" / "arms_s0", arms / "runs" / "arms_s1")
+    config = json.loads((arms / "runs" / "arms_s0" / "config.json").read_text()) | {"seed": 1}
+    (arms / "runs" / "arms_s1" / "config.json").write_text(json.dumps(config))
+    record = json.loads((arms / "evaluations" / "arms_s0.json").read_text()) | {"run": "arms_s1"}
+    del record["types"]["I"]
+    (arms / "evaluations" / "arms_s1.json").write_text(json.dumps(record))
+    assert {row["test_type"]: row["seeds"] for row in make_appendix(tmp_path / "results")} == {"A": [0, 1], "I": [0]}
 
 
 def test_a_run_that_is_collected_later_is_added_to_those_before(results, finished_arms, tmp_path):
@@ -128,9 +163,9 @@ def test_an_evaluation_of_a_policy_that_was_replaced_is_named(results, finished_
     shutil.copytree(finished_arms, tmp_path / "runs" / "arms_s0")
     record = tmp_path / "results" / "arms" / "evaluations" / "arms_s0.json"
     record.parent.mkdir(exist_ok=True)
-    shutil.copy(ROOT / "results" / "arms" / "evaluations" / "reacher_ddpg_leave_h_s0.json", record)
+    record.write_text(json.dumps(MEASURED | {"types": {}}))
     collect.main([str(tmp_path / "runs"), "--out", str(tmp_path / "results")])
-    assert "evaluate it anew" not in capsys.readouterr().out
+    assert "measure it anew" not in capsys.readouterr().out
     policy = tmp_path / "results" / "policies" / "arms_s0" / "policy.msgpack"
     policy.write_bytes(policy.read_bytes()[:-1] + b"\x01")
     collect.main([str(tmp_path / "runs"), "--out", str(tmp_path / "results")])
@@ -140,7 +175,7 @@ def test_an_evaluation_of_a_policy_that_was_replaced_is_named(results, finished_
 @pytest.mark.parametrize(
     ("name", "content", "expected"),
     [
-        ("arms/evaluations/arms_s0.json", {"types": {}}, "no field 'checkpoint_env_steps'"),
+        ("arms/evaluations/arms_s0.json", {"types": {}}, "no field 'run'"),
         (
             "arms/evaluations/arms_s0.json",
             MEASURED | {"types": {"H": {}}},

@@ -7,7 +7,7 @@ import pytest
 from hcp_jax import catalogue
 from hcp_jax.config import ArmPoolConfig, Config, ConfigError, to_dict
 from hcp_jax.evaluation.arm_sweeps import evaluate_arms
-from hcp_jax.evaluation.catalogue_table import make_catalogue_table
+from hcp_jax.evaluation.catalogue_table import make_catalogue_table, summarise
 from hcp_jax.experiment.arm import make_own_pools
 from hcp_jax.hardware.ranges import ArmRanges
 from hcp_jax.training import loop
@@ -48,6 +48,21 @@ def test_variants_of_an_arm_differ_in_masses_and_joint_dynamics_alone(panda_conf
     for name in ("chain_pos", "chain_quat", "joint_range", "torque_limit", "start_angles"):
         np.testing.assert_array_equal(variants.hardware[name], arm.hardware[name].repeat(4, axis=0))
     np.testing.assert_array_equal(evaluated.hardware["damping"], arm.hardware["damping"].repeat(3, axis=0))
+
+
+def test_an_arm_that_a_policy_was_trained_on_is_no_zero_shot(capsys):
+    types = {
+        name: {"success_mean": mean, "success_std": 1.0, "reachable_success_mean": None, "zero_shot": name != "sawyer"}
+        for name, mean in (("panda", 10.0), ("sawyer", 90.0), ("ur5e", 30.0))
+    }
+    record = {"run": "policies/one", "checkpoint_env_steps": 7, "types": types}
+    rows = [{"robot": name, "reachable_share": 99.0, "zero_shot": [summarise(record, name)]} for name in types]
+    catalogue.print_table([row | {"fine_tuned": summarise(record, row["robot"]) if i else None} for i, row in enumerate(rows)])
+    shown = capsys.readouterr().out
+    assert "90.0 (trained on it)" in shown
+    assert shown.count("trained on it") == 1
+    assert "median zero-shot success: 20.0 %, one" in shown
+    assert shown.count("n/a") == 1
 
 
 @pytest.mark.slow

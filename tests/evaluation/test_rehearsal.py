@@ -104,6 +104,15 @@ def test_real_conditions_are_the_parts_that_are_also_tried_alone():
     assert together == dataclasses.asdict(REAL)
 
 
+def test_success_and_distances_of_each_condition_are_shown(capsys):
+    quantiles = {"0.5": 0.013, "1": 0.25}
+    conditions = {name: {"success": 70.0 + i, "final_distance_quantiles": quantiles} for i, name in enumerate(CONDITIONS)}
+    rehearse.print_record({"run": "policies/one", "robot": "H:1", "conditions": conditions})
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in ("policies/one on H:1", "50%", "100%", "0.013", "0.250", *CONDITIONS))
+    assert [f"{70 + i}" in shown for i in range(len(CONDITIONS))] == [True] * len(CONDITIONS)
+
+
 @pytest.mark.slow
 def test_the_command_writes_each_goal_under_all_conditions(finished_arms, tmp_path, capsys):
     rehearse.main([str(finished_arms), "--robot", "H:1", "--goals", "3", "--json", str(tmp_path / "record.json")])
