@@ -51,7 +51,7 @@ def evaluate_arms(
             that the run was trained on, if there is one.
 
     Returns:
-        The record that `evaluate --json` writes (DESIGN.md, "The command line"); success in percent, distances in m.
+        The record that `evaluate --json` writes; success in percent, distances in m.
 
     Raises:
         RunFolderError, CheckpointError, ConfigError, PoolError, RobotFileError: the folder, a type, the pool or an arm cannot

@@ -58,7 +58,7 @@ def evaluate_hoppers(
         pool_folder: a saved pool to take the new robots from.
 
     Returns:
-        The record that `evaluate --json` writes (DESIGN.md, "The command line").
+        The record that `evaluate --json` writes.
 
     Raises:
         RunFolderError, CheckpointError, ConfigError, PoolError: the folder or the pool cannot be evaluated.

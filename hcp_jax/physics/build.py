@@ -12,7 +12,7 @@ def resolve_physics(name: str) -> str:
 
 
 def default_physics() -> str:
-    """The engine that `auto` stands for on this machine's default JAX backend (DESIGN.md, decision 4)."""
+    """The engine that `auto` stands for on this machine's default JAX backend."""
     backend = jax.default_backend()
     if backend == "cpu":
         return "native"

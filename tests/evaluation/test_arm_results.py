@@ -26,7 +26,7 @@ def test_collected_successes_come_from_the_run_folder(results, finished_arms):
     (row,) = json.loads((results / "arms" / "summary.json").read_text())
     assert (row["algorithm"], row["seeds"], row["env_steps"]) == ("HCP-E", [0], 320)
     assert row["left_out_success_mean"] == round(float(last["left_out_success"]), 1)
-    assert (results / "arms" / "reacher.png").read_bytes().startswith(b"\x89PNG")
+    assert (results / "arms" / "reacher_leave_h.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_published_arm_policy_moves_as_its_run_does(results, finished_arms):
