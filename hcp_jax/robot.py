@@ -38,6 +38,8 @@ def main(arguments: list[str] | None = None) -> None:
         config = read_config(options.policy) if options.policy else presets.arm("trained", options.task, "none")
         if not isinstance(config.pool, ArmPoolConfig) or config.robot:
             raise ConfigError(f"--policy={options.policy}: expected one that was trained on types of arms")
+        for note in robot.notes:  # first: an arm that can be read may still reach nothing
+            command_line.show(f"note: {note}")
         own, trained = make_own_pool(config.task, robot), make_train_arms(config)
         record = describe(robot, own, trained)
         print_record(record)
@@ -79,8 +81,6 @@ def print_record(record: dict) -> None:
         numbers = (f"{joint[name]:g}" for name in SCALARS)
         table.add_row(joint["name"], "{:.2f} to {:.2f}".format(*joint["range"]), *numbers)
     command_line.show(table)
-    for note in record["notes"]:
-        command_line.show(f"note: {note}")
     poses = Table(title="v_h (`chain`): each joint in the frame of the one before, last the tip")
     for head in ("", "x [m]", "y [m]", "z [m]", "x [rad]", "y [rad]", "z [rad]"):
         poses.add_column(head, justify="right")

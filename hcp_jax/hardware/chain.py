@@ -235,17 +235,23 @@ def _quat_of(rotation: np.ndarray) -> np.ndarray:
 
 
 def _torque_limit(model: mujoco.MjModel, joint: int) -> float:
-    """Largest torque of the actuator on `joint` within what the joint allows (a URDF's effort); 0 where neither says.
+    """Largest torque of the actuators on `joint` within what the joint allows (a URDF's effort); 0 where neither says."""
+    is_on_joint = (model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT) & (model.actuator_trnid[:, 0] == joint)
+    bounds = [_largest_torque(model, int(actuator)) for actuator in np.flatnonzero(is_on_joint)]
+    given = max((bound for bound in bounds if 0.0 < bound < np.inf), default=np.inf)
+    allowed = np.abs(model.jnt_actfrcrange[joint]).max() if model.jnt_actfrclimited[joint] else np.inf
+    limit = min(given, allowed)
+    return float(limit) if limit < np.inf else 0.0
+
+
+def _largest_torque(model: mujoco.MjModel, actuator: int) -> float:
+    """What an actuator gives to its joint at most; infinite where its model does not say.
 
     A motor's control is its force. That of a servo is an angle or a speed, and says nothing of its force.
     """
-    limits = [np.abs(model.jnt_actfrcrange[joint]).max()] if model.jnt_actfrclimited[joint] else []
-    for actuator in np.flatnonzero(model.actuator_trnid[:, 0] == joint)[:1]:
-        gear = abs(model.actuator_gear[actuator, 0])
-        is_motor = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_NONE
-        if model.actuator_forcelimited[actuator]:
-            limits.append(gear * np.abs(model.actuator_forcerange[actuator]).max())
-        if is_motor and (model.actuator_ctrllimited[actuator] or not limits):
-            control = np.abs(model.actuator_ctrlrange[actuator]).max() if model.actuator_ctrllimited[actuator] else 1.0
-            limits.append(gear * abs(model.actuator_gainprm[actuator, 0]) * control)
-    return float(min(limits, default=0.0))
+    force = control = np.inf
+    if model.actuator_forcelimited[actuator]:
+        force = np.abs(model.actuator_forcerange[actuator]).max()
+    if model.actuator_ctrllimited[actuator] and model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_NONE:
+        control = abs(model.actuator_gainprm[actuator, 0]) * np.abs(model.actuator_ctrlrange[actuator]).max()
+    return abs(model.actuator_gear[actuator, 0]) * min(force, control)

@@ -55,7 +55,10 @@ def make_own_pool(task: str, robot: RobotFile) -> RobotPool:
     angles, distance = reach_points([robot.chain], points[None], seed=0, num_samples=_NUM_SAMPLES, num_starts=_NUM_STARTS)
     reached = distance[0] < MAX_ERROR
     if not reached.any():
-        raise RobotFileError(f"reaches no point that the reacher starts from; it comes within {distance.min():.2f} m of one")
+        raise RobotFileError(
+            f"the arm from {robot.base} to {robot.tip} reaches no point that the reacher starts from; "
+            f"it comes within {distance.min():.2f} m of one"
+        )
     return _make_pool(task, [robot.chain], angles[0][reached])
 
 

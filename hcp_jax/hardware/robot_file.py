@@ -17,7 +17,8 @@ import numpy as np
 
 from hcp_jax.errors import one_line
 from hcp_jax.hardware.chain import GRAVITY, MAX_JOINTS, Chain, read_chain
-from hcp_jax.hardware.robot_formats import RobotFileError, load_robot_spec
+from hcp_jax.hardware.robot_formats import load_robot_spec
+from hcp_jax.hardware.robot_xml import RobotFileError
 
 MAX_SECONDS = 9.0
 # What is assumed where a file says nothing: [N m] of joint 0 to 6, as the arms that policies were trained on; [N m s/rad],
@@ -26,6 +27,7 @@ ASSUMED_TORQUE_LIMITS = (80.0, 80.0, 40.0, 40.0, 9.0, 9.0, 9.0)
 ASSUMED_DAMPING, ASSUMED_ARMATURE = 1.0, 0.1
 _TIP_SITE = "hcp_jax tip"  # a name that no file has
 _MIN_INERTIA = 1e-12  # [kg], [kg m^2]
+_MIN_TILT = 0.1  # [degrees] of a base's z that is worth a word
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,12 +115,12 @@ def read_robot_here(path: pathlib.Path, base: str | None, tip: str | None) -> Ro
     """`read_robot` in this process, which a hostile file may take down."""
     notes: list[str] = []
     spec, moved_by = load_robot_spec(path, notes)
-    name_all(spec)
     links = [body.name for body in spec.bodies[1:]]
     for role, name in (("base", base), ("tip", tip)):
         if name is not None and name not in links:
             raise RobotFileError(f"--{role}={name}: no such link; there are {', '.join(links)}")
-    remove_all_but_bodies(spec)
+    ties = find_ties(spec)
+    remove_all_but_bodies(spec, notes)
     tip_body = spec.body(tip) if tip else find_tip(spec)
     path_bodies = bodies_towards(tip_body)
     base_body = spec.body(base) if base else path_bodies[0]
@@ -127,6 +129,7 @@ def read_robot_here(path: pathlib.Path, base: str | None, tip: str | None) -> Ro
     moving = path_bodies[path_bodies.index(base_body) + (1 if base else 0) :]
     fix_joints(spec, moving, notes)
     check_joints(moving, moved_by)
+    check_ties(ties, notes)
     check_masses(moving)
     note_other_forces(spec, moving, notes)
     tip_body.add_site(name=_TIP_SITE)
@@ -138,24 +141,15 @@ def read_robot_here(path: pathlib.Path, base: str | None, tip: str | None) -> Ro
     joints = [joint for body in moving for joint in body.joints]
     chain = check_chain(chain, model, joints, notes)
     if base:
-        chain = relative_to(chain, model, base_body.name)
-    return RobotFile(chain, tuple(j.name for j in joints), base_body.name or "world", tip_body.name, tuple(notes))
+        chain = relative_to(chain, model, base_body.name, notes)
+    stands_on = spec.worldbody if base_body.joints else base_body
+    return RobotFile(chain, tuple(j.name for j in joints), stands_on.name, tip_body.name, tuple(notes))
 
 
-def name_all(spec: mujoco.MjSpec) -> None:
-    """Names bodies that have no name, as MJCF allows, by number; and joints after their body."""
-    bodies, joints = {body.name for body in spec.bodies}, {joint.name for joint in spec.joints}
-    for body in spec.bodies[1:]:
-        body.name = body.name or next(name for i in itertools.count(1) if (name := f"body{i}") not in bodies)
-        bodies.add(body.name)
-        for joint in body.joints:
-            endings = itertools.chain([""], (f"_{i}" for i in itertools.count(2)))
-            joint.name = joint.name or next(name for ending in endings if (name := body.name + ending) not in joints)
-            joints.add(joint.name)
-
-
-def remove_all_but_bodies(spec: mujoco.MjSpec) -> None:
+def remove_all_but_bodies(spec: mujoco.MjSpec, notes: list[str]) -> None:
     """Deletes what refers to joints and is not needed: only bodies, joints and motors of joints are left."""
+    if spec.tendons:
+        notes.append(f"tendons left out: {', '.join(tendon.name or 'one without a name' for tendon in spec.tendons)}")
     kinds = ("keys", "equalities", "tendons", "sensors", "excludes", "pairs", "cameras", "lights", "skins", "flexes")
     for actuator in list(spec.actuators):
         if actuator.trntype != mujoco.mjtTrn.mjTRN_JOINT:
@@ -166,7 +160,7 @@ def remove_all_but_bodies(spec: mujoco.MjSpec) -> None:
 
 
 def find_tip(spec: mujoco.MjSpec) -> mujoco.MjsBody:
-    """The last link of the one chain of hinges.
+    """The last link of the one chain of hinges, before any other joint that follows them.
 
     Raises:
         RobotFileError: there is none, or there are several.
@@ -183,7 +177,9 @@ def find_tip(spec: mujoco.MjSpec) -> mujoco.MjsBody:
             raise RobotFileError(f"branches: to {other} and to {name}; choose one end with --tip")
     ends = [bodies_towards(leaf) for leaf in leaves if hinges[leaf.name] == longest]
     common = [bodies[0] for bodies in zip(*ends, strict=False) if all(body.name == bodies[0].name for body in bodies)]
-    return common[-1]
+    last = max(index for index, body in enumerate(common) if hinge_names([body]))
+    after = itertools.takewhile(lambda body: not body.joints, common[last + 1 :])
+    return [common[last], *after][-1]
 
 
 def hinge_names(bodies: list[mujoco.MjsBody]) -> tuple[str, ...]:
@@ -211,7 +207,7 @@ def fix_joints(spec: mujoco.MjSpec, moving: list[mujoco.MjsBody], notes: list[st
                     spec.delete(actuator)
                 spec.delete(joint)
     if fixed:
-        notes.append(f"joints fixed at 0: {', '.join(fixed)}")
+        notes.append(f"joints fixed where the file has them: {', '.join(fixed)}")
 
 
 def check_joints(moving: list[mujoco.MjsBody], moved_by: Mapping[str, str]) -> None:
@@ -228,11 +224,59 @@ def check_joints(moving: list[mujoco.MjsBody], moved_by: Mapping[str, str]) -> N
         raise RobotFileError(f"{count} hinges between base and tip: expected 1 to {MAX_JOINTS}")
 
 
+def find_ties(spec: mujoco.MjSpec) -> list[tuple[mujoco.MjsBody, mujoco.MjsBody]]:
+    """The pairs of bodies that a file ties together, beside its joints.
+
+    Raises:
+        RobotFileError: there is no such body, or site on one.
+    """
+    kinds = (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD)
+    ties = []
+    for tie in (equality for equality in spec.equalities if equality.active and equality.type in kinds):
+        on_sites = tie.objtype == mujoco.mjtObj.mjOBJ_SITE
+        ends = [spec.site(name) if on_sites else spec.body(name or "world") for name in (tie.name1, tie.name2)]
+        if None in ends:
+            kind = "site" if on_sites else "body"
+            raise RobotFileError(f"constraint of {tie.name1} and {tie.name2 or 'world'}: there is no {kind} of that name")
+        one, other = (end.parent if on_sites else end for end in ends)
+        ties.append((one, other))
+    return ties
+
+
+def check_ties(ties: list[tuple[mujoco.MjsBody, mujoco.MjsBody]], notes: list[str]) -> None:
+    """Says which ties to mocap bodies are left out; raises RobotFileError for one between bodies that move apart."""
+    for one, other in ties:
+        if moved_with(one) == moved_with(other):
+            continue
+        if not (one.mocap or other.mocap):
+            raise RobotFileError(f"link {one.name}: is tied to {other.name} by a constraint; expected an open chain")
+        notes.append(f"constraint to a mocap body left out: {one.name} to {other.name}")
+
+
+def moved_with(body: mujoco.MjsBody) -> mujoco.MjsBody:
+    """The body whose joint moves `body`; the world where none does."""
+    while body.parent is not None and not body.joints:
+        body = body.parent
+    return body
+
+
 def check_masses(moving: list[mujoco.MjsBody]) -> None:
-    """Raises RobotFileError for a moving link that weighs nothing."""
+    """Raises RobotFileError for a joint that moves nothing that weighs anything."""
     for body in moving:
-        if body.joints and not body.geoms and (body.mass < _MIN_INERTIA or not body.explicitinertial):
+        if body.joints and not any(map(may_weigh, moved_by_joint_of(body))):
             raise RobotFileError(f"link {body.name}: moves and has no mass (no inertia in the file, meshes missing)")
+
+
+def moved_by_joint_of(body: mujoco.MjsBody) -> list[mujoco.MjsBody]:
+    """`body` and all that is rigidly attached to it, up to the next joints."""
+    rigid = [body]
+    for part in rigid:  # which grows
+        rigid += [child for child in part.bodies if not child.joints]
+    return rigid
+
+
+def may_weigh(body: mujoco.MjsBody) -> bool:
+    return bool(body.geoms) or (body.explicitinertial and body.mass >= _MIN_INERTIA)
 
 
 def note_other_forces(spec: mujoco.MjSpec, moving: list[mujoco.MjsBody], notes: list[str]) -> None:
@@ -281,12 +325,17 @@ def check_chain(chain: Chain, model: mujoco.MjModel, joints: list, notes: list[s
     return dataclasses.replace(chain, **filled)
 
 
-def relative_to(chain: Chain, model: mujoco.MjModel, base: str) -> Chain:
-    """The chain with body `base` at the world's origin."""
+def relative_to(chain: Chain, model: mujoco.MjModel, base: str, notes: list[str]) -> Chain:
+    """The chain with body `base` at the world's origin; says so where gravity pulls along another of its axes then."""
     data = mujoco.MjData(model)
     data.qpos[:] = 0.0
     mujoco.mj_kinematics(model, data)
     body = data.body(base)
+    tilt = np.degrees(np.arccos(np.clip(body.xmat[8], -1.0, 1.0)))  # of its z
+    if tilt > _MIN_TILT:
+        notes.append(
+            f"base {base} is turned by {tilt:.3g} degrees against the file's world: gravity then pulls along the base's -z"
+        )
     inverse, position, quat = np.zeros(4), np.zeros(3), np.zeros(4)
     mujoco.mju_negQuat(inverse, body.xquat)
     mujoco.mju_rotVecQuat(position, chain.pos[0] - body.xpos, inverse)

@@ -1,50 +1,17 @@
 """URDF and MJCF files as MuJoCo specs of bodies, joints and inertias, without pictures."""
 
+import itertools
 import math
 import pathlib
 import xml.etree.ElementTree as ElementTree
-from xml.parsers import expat
 
 import mujoco
 import numpy as np
 
-from hcp_jax.errors import UserError, one_line
+from hcp_jax.errors import one_line
+from hcp_jax.hardware.robot_xml import RobotFileError, check_references, parse_xml
 
-MAX_BYTES = 20_000_000
 MAX_ROUNDING = 0.01  # share of a link's largest moment of inertia that digits left out may have made too much of it
-
-
-class RobotFileError(UserError):
-    """A robot file cannot be read as a serial arm."""
-
-
-def parse_xml(path: pathlib.Path) -> ElementTree.Element:
-    """The root of a URDF or MJCF file, or of one that it includes.
-
-    Document types are refused: with them a short file can expand without bound.
-    """
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise RobotFileError(f"larger than {MAX_BYTES / 1e6:.0f} MB")
-        text = path.read_bytes()
-    except OSError as error:
-        raise RobotFileError(error.strerror or "cannot be read") from error
-
-    def refuse(*_):
-        raise RobotFileError("has a document type declaration (<!DOCTYPE ...>), which is not allowed")
-
-    checker = expat.ParserCreate()
-    checker.StartDoctypeDeclHandler = refuse
-    try:
-        checker.Parse(text, True)
-        root = ElementTree.fromstring(text)
-    except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
-        if isinstance(error, RobotFileError):
-            raise
-        raise RobotFileError(f"not XML ({one_line(error)})") from error
-    if any("xacro}" in element.tag for element in root.iter()):  # in the namespace of that name
-        raise RobotFileError("is a xacro template: expected what `xacro FILE` makes of it")
-    return root
 
 
 def load_robot_spec(path: pathlib.Path, notes: list[str]) -> tuple[mujoco.MjSpec, dict[str, str]]:
@@ -55,7 +22,7 @@ def load_robot_spec(path: pathlib.Path, notes: list[str]) -> tuple[mujoco.MjSpec
         notes: gets a line for what is left out.
 
     Returns:
-        bodies, joints and inertias; and of each joint that another one moves, that one's name.
+        bodies, joints and inertias, all of them named; and of each joint that another one moves, that one's name.
 
     Raises:
         RobotFileError: the file is neither, or refers to files outside its folder.
@@ -72,8 +39,8 @@ def load_robot_spec(path: pathlib.Path, notes: list[str]) -> tuple[mujoco.MjSpec
         raise RobotFileError(f"starts with <{root.tag}>: expected <robot> (URDF) or <mujoco> (MJCF)")
     spec = load_mjcf(path, root, notes)
     relax_inertias(spec, notes)
-    joint_constraints = [equality for equality in spec.equalities if equality.type == mujoco.mjtEq.mjEQ_JOINT]
-    return spec, {equality.name1: equality.name2 or "a constant" for equality in joint_constraints}
+    constraints = [equality for equality in spec.equalities if equality.active and equality.type == mujoco.mjtEq.mjEQ_JOINT]
+    return spec, {constraint.name1: constraint.name2 or "a constant" for constraint in constraints}
 
 
 def load_urdf(root: ElementTree.Element) -> mujoco.MjSpec:
@@ -118,16 +85,22 @@ def load_spec(text: str) -> mujoco.MjSpec:
 
 def load_mjcf(path: pathlib.Path, root: ElementTree.Element, notes: list[str]) -> mujoco.MjSpec:
     """An MJCF file and what it includes, without geoms of meshes that are missing and without pictures."""
-    check_references(path.parent.resolve(), path.parent, root, set())
+    check_references(path, root)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except (ValueError, mujoco.FatalError) as error:
         raise RobotFileError(one_line(error)) from error
+    name_all(spec)
+    spec.compiler.fusestatic = False  # links are asked for by name
     folder = path.parent / (spec.meshdir or "")
-    missing = {mesh.name: mesh for mesh in spec.meshes if mesh.file and not (folder / mesh.file).exists()}
+    missing = {mesh.name for mesh in spec.meshes if mesh.file and not (folder / mesh.file).exists()}
+    if missing:
+        notes.append(f"meshes that are missing: {', '.join(sorted(missing))}")
+    note_missing_masses(spec, missing, notes)
     for body in spec.bodies:
+        is_weighed = weighs_geoms(spec, body)
         for geom in list(body.geoms):
-            if body.explicitinertial or geom.meshname in missing or geom.type == mujoco.mjtGeom.mjGEOM_HFIELD:
+            if not is_weighed or geom.meshname in missing or geom.type == mujoco.mjtGeom.mjGEOM_HFIELD:
                 spec.delete(geom)
             else:
                 geom.material = ""
@@ -138,9 +111,37 @@ def load_mjcf(path: pathlib.Path, root: ElementTree.Element, notes: list[str]) -
             spec.delete(mesh)
     for picture in [*spec.materials, *spec.textures, *spec.hfields]:
         spec.delete(picture)
-    if missing:
-        notes.append(f"meshes that are missing: {', '.join(sorted(missing))}")
     return spec
+
+
+def name_all(spec: mujoco.MjSpec) -> None:
+    """Names bodies that have no name, as MJCF allows, by number; and joints after their body."""
+    bodies, joints = {body.name for body in spec.bodies}, {joint.name for joint in spec.joints}
+    for body in spec.bodies[1:]:
+        body.name = body.name or next(name for i in itertools.count(1) if (name := f"body{i}") not in bodies)
+        bodies.add(body.name)
+        for joint in body.joints:
+            endings = itertools.chain([""], (f"_{i}" for i in itertools.count(2)))
+            joint.name = joint.name or next(name for ending in endings if (name := body.name + ending) not in joints)
+            joints.add(joint.name)
+
+
+def weighs_geoms(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> bool:
+    """Whether a link's mass and inertia are those of its geoms, and not the ones stated."""
+    rules = mujoco.mjtInertiaFromGeom
+    rule = spec.compiler.inertiafromgeom
+    return rule == rules.mjINERTIAFROMGEOM_TRUE or (rule == rules.mjINERTIAFROMGEOM_AUTO and not body.explicitinertial)
+
+
+def note_missing_masses(spec: mujoco.MjSpec, missing: set[str], notes: list[str]) -> None:
+    """Says of which links a part of the mass is missing, with the meshes of that part."""
+    low, high = spec.compiler.inertiagrouprange
+    for body in spec.bodies[1:]:
+        parts = [geom for geom in body.geoms if geom.meshname in missing and low <= geom.group <= high]
+        # Where a geom's mass is not stated it is not a number, and its density counts.
+        lost = sorted({part.meshname for part in parts if part.mass != 0 and (part.mass > 0 or part.density != 0)})
+        if lost and weighs_geoms(spec, body):
+            notes.append(f"mass of link {body.name} without its missing meshes: {', '.join(lost)}")
 
 
 def relax_inertias(spec: mujoco.MjSpec, notes: list[str]) -> None:
@@ -174,24 +175,3 @@ def relax_inertias(spec: mujoco.MjSpec, notes: list[str]) -> None:
             body.fullinertia = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
         else:
             body.inertia = moments
-
-
-def check_references(folder: pathlib.Path, where: pathlib.Path, root: ElementTree.Element, seen: set[pathlib.Path]) -> None:
-    """Raises RobotFileError where a file refers to one outside `folder`, and follows its includes."""
-    compiler = root.find("compiler")
-    directories = [compiler.get(name, "") for name in ("meshdir", "texturedir", "assetdir")] if compiler is not None else []
-    for element in root.iter():
-        name = element.get("file")
-        if not name:
-            continue
-        for directory in ("", *directories):
-            target = (where / directory / name).resolve()
-            if not target.is_relative_to(folder):
-                raise RobotFileError(f"<{element.tag} file={name!r}> is outside the file's folder")
-        target = (where / name).resolve()
-        if element.tag == "include":
-            if target in seen:
-                raise RobotFileError(f"<include file={name!r}> includes itself")
-            seen.add(target)
-            if target.exists():
-                check_references(folder, where, parse_xml(target), seen)

@@ -22,13 +22,13 @@ def test_zero_width_ranges_leave_the_template_unchanged():
 
 
 def test_every_hopper_stands_at_height_one_and_a_quarter_with_its_ankle_a_tenth_above_the_floor(pool):
-    for model in pool.models()[:8]:
+    for robot, model in enumerate(pool.models()[:8]):
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
+        torso, thigh, leg, _ = pool.hardware["link_length"][robot]
         assert data.qpos[1] == 1.25
         assert data.body("foot").xpos[2] == pytest.approx(0.1)
-        half_torso = pool.hardware["link_length"][0, 0] / 2
-        assert half_torso > 0
+        assert data.body("torso").xpos[2] == pytest.approx(0.1 + leg + thigh + torso / 2)
 
 
 def test_link_lengths_are_the_distances_between_joints(pool):

@@ -64,13 +64,27 @@ def test_its_start_poses_are_at_the_points_that_the_reacher_starts_from(one_of_t
 def test_an_arm_that_reaches_nothing_is_refused(tmp_path):
     (tmp_path / "short.urdf").write_text(arm(2))
     short = read_robot_here(tmp_path / "short.urdf", None, None)
-    with pytest.raises(RobotFileError, match="reaches no point that the reacher starts from"):
+    with pytest.raises(RobotFileError, match="the arm from l0 to l2 reaches no point that the reacher starts from"):
         make_own_pool("reacher", short)
 
 
+def test_what_was_noted_is_said_of_an_arm_that_reaches_nothing_too(tmp_path, capsys):
+    (tmp_path / "short.urdf").write_text(arm(2))
+    with pytest.raises(SystemExit) as exit_info:
+        robot.main(["check", str(tmp_path / "short.urdf")])
+    shown = capsys.readouterr()
+    assert exit_info.value.code == 2
+    assert "note: armature assumed [kg m^2]: j0 0.1, j1 0.1" in shown.out
+    assert shown.err.startswith("the arm from l0 to l2 reaches no point")
+
+
 def test_the_command_says_joints_assumptions_and_what_lies_outside(tmp_path, capsys):
-    robot.main(["check", str(TEMPLATE), "--tip", "l6", "--json", str(tmp_path / "out.json")])
+    (tmp_path / "arm.xml").write_text(TEMPLATE.read_text().replace(' damping="15"', "", 1))
+    robot.main(["check", str(tmp_path / "arm.xml"), "--tip", "l6", "--json", str(tmp_path / "out.json")])
     shown, record = capsys.readouterr().out, json.loads((tmp_path / "out.json").read_text())
+    assert record["notes"] == ["damping assumed [N m s/rad]: j0 1"]
+    assert "note: damping assumed [N m s/rad]: j0 1" in shown
+    assert "world to l6: 7 joints" in shown
     assert [joint["name"] for joint in record["joints"]] == [f"j{i}" for i in range(7)]
     assert record["nearest"]["type"] == "I"
     assert "nearest training arm: type I" in shown
