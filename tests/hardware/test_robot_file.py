@@ -10,7 +10,8 @@ from hcp_jax.hardware.chain import Chain, read_chain
 from hcp_jax.hardware.own_arm import make_own_pool, make_own_variants
 from hcp_jax.hardware.pool import robots_path
 from hcp_jax.hardware.ranges import ArmRanges
-from hcp_jax.hardware.robot_file import ASSUMED_TORQUE_LIMITS, RobotFileError, read_robot, read_robot_here
+from hcp_jax.hardware.robot_checks import ASSUMED_TORQUE_LIMITS
+from hcp_jax.hardware.robot_file import RobotFileError, read_robot, read_robot_here
 
 BOMB = '<?xml version="1.0"?><!DOCTYPE b [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><robot name="&b;"/>'
 FORK = robot(*(link(f"l{i}") for i in range(3)), joint("j0", "l0", "l1"), joint("j1", "l0", "l2"))
