@@ -30,7 +30,6 @@ OLDER = {
             "ddpg.actor_average",
         },
     ),
-    "random_peg_film_leave_e_s0": ("trained before the mean of the actors was over more iterations", {"ddpg.actor_average"}),
 }
 
 
