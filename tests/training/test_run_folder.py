@@ -48,3 +48,13 @@ def test_seeds_on_the_same_arm_are_one_experiment_wherever_its_file_is(tiny_arms
         run_folder.write_start(tmp_path / f"run{number}", config, "native")
     groups = group_by_settings([tmp_path / f"run{number}" for number in range(3)], run_folder.read_config)
     assert [[folder.name for folder in group] for group in groups] == [["run0", "run1"], ["run2"]]
+
+
+def test_an_arm_of_the_catalogue_with_another_tip_is_another_arm(tiny_arms, tmp_path):
+    config = dataclasses.replace(tiny_arms, pool=presets.one_arm(1), robot="panda")
+    other = dataclasses.replace(config, robot_tip="panda_link5")
+    assert run_folder.find_differences(config, other) == [("robot_tip", "", "panda_link5")]
+    assert [len(group) for group in group_by_settings([config, config, other], lambda config: config)] == [2, 1]
+    run_folder.write_start(tmp_path, config, "native")
+    with pytest.raises(RunFolderError, match="was started with robot_tip='', not 'panda_link5'"):
+        run_folder.check_resumable(tmp_path, other)
