@@ -15,6 +15,7 @@ from hcp_jax.training import sweeping
 
 EXPERIMENTS = pathlib.Path(__file__).resolve().parents[1] / "experiments"
 HOPPER = str(EXPERIMENTS / "hopper_ppo.py")
+HCPI = str(EXPERIMENTS / "hopper_embedding.py")
 REACHER = str(EXPERIMENTS / "reacher_hcpe_leave_h.py")
 PEG = str(EXPERIMENTS / "peg_jacobian_leave_h.py")
 POLICY = EXPERIMENTS.parent / "results" / "policies" / "reacher_hcpe_leave_h_s0"
@@ -124,6 +125,10 @@ BAD_ARGUMENTS = {
     "identification by ddpg": (
         ["--config", REACHER, "--config.embedding.identify_steps=1000"],
         "embedding.identify_steps=1000: expected 0 for ddpg",
+    ),
+    "nothing but identification": (
+        ["--config", HCPI, "--config.embedding.identify_steps=5000000"],
+        "embedding.identify_steps=5000000: must leave an iteration (32000 steps) of total_env_steps=5000000",
     ),
     "more robots than ids": (
         ["--config", REACHER, "--config.pool.robots_per_type=10001"],

@@ -121,6 +121,12 @@ class Config:
                 f"ppo.num_minibatches={self.ppo.num_minibatches}: must divide num_envs * ppo.unroll_length = "
                 f"{self.resolved_num_envs} * {self.ppo.unroll_length} = {batch}"
             )
+        identify_steps = self.embedding.identify_steps
+        if self.encoding == "embedding" and -(-identify_steps // batch) >= self.num_iterations:  # the policy starts after it
+            raise ConfigError(
+                f"embedding.identify_steps={identify_steps}: must leave an iteration ({batch} steps) of "
+                f"total_env_steps={self.total_env_steps}"
+            )
 
     def _check_ddpg(self) -> None:
         require(self.embedding.identify_steps == 0, "embedding.identify_steps", self.embedding.identify_steps, "0 for ddpg")
@@ -137,6 +143,11 @@ class Config:
     @property
     def resolved_num_envs(self) -> int:
         return self.num_envs or self.pool.num_robots
+
+    @property
+    def num_iterations(self) -> int:
+        """Of the run."""
+        return -(-self.total_env_steps // self.batch_size)
 
     @property
     def batch_size(self) -> int:
