@@ -26,6 +26,7 @@ from hcp_jax.errors import NonFiniteError, PhysicsOverflowError
 from hcp_jax.experiment.arm import load_own_robot
 from hcp_jax.experiment.base import Experiment, TrainingState
 from hcp_jax.experiment.build import make_experiment
+from hcp_jax.physics.build import resolve_physics
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import Checkpoints, latest_iteration
 from hcp_jax.training.curves import plot_curves
@@ -80,7 +81,7 @@ def train(
         PhysicsOverflowError: the physics dropped contacts or constraints.
         NonFiniteError: losses or gradients stopped being finite; the newest checkpoint is from before.
     """
-    do_in_main(lambda: run_folder.check_resumable(folder, config) if resume else run_folder.check_new(folder))
+    do_in_main(lambda: _check_folder(folder, config, resume))
     if config.robot:
         load_own_robot(config)  # what is wrong with it is said before all else is compiled
     goes_on = resume and latest_iteration(folder / run_folder.CHECKPOINT_FOLDER) is not None
@@ -102,6 +103,15 @@ def train(
         return _run(run, state, folder, resume, held.enter_context(Interrupt().installed()) if interrupt is None else interrupt)
 
 
+def _check_folder(folder: pathlib.Path, config: Config, resume: bool) -> None:
+    """Raises RunFolderError where the run cannot start, or go on, in `folder`."""
+    if resume:
+        run_folder.check_resumable(folder, config)
+        run_folder.check_physics(folder, resolve_physics(config.physics))
+    else:
+        run_folder.check_new(folder)
+
+
 def _run(
     run: Experiment, state: TrainingState, folder: pathlib.Path, resume: bool, interrupt: Interrupt
 ) -> dict[str, float] | None:
@@ -119,8 +129,18 @@ def _run(
         done, total = iteration * run.config.batch_size, run.config.total_env_steps
         raise run_folder.RunFolderError(f"--config.total_env_steps={total}: {folder} is at {done:,} steps; expected no fewer")
     if resume:
-        do_in_main(lambda: run_folder.write_changes(folder, run.config))
+        do_in_main(lambda: _record_changes(folder, run.config))
     return TrainingLoop(run, folder, checkpoints, iteration).run(state, interrupt)
+
+
+def _record_changes(folder: pathlib.Path, config: Config) -> None:
+    """Writes what a resumed run changes, and says what more steps mean for its schedules."""
+    before = run_folder.read_config(folder).total_env_steps
+    if config.total_env_steps > before:
+        switch = config.algorithm == "ddpg" and config.ddpg.n_step > 1 and config.ddpg.n_step_from > 0.0
+        stretched = "the decay of the step sizes" + (f" and the switch to {config.ddpg.n_step}-step returns" if switch else "")
+        say(f"{config.total_env_steps:,} steps instead of {before:,}: stretched over the new length: {stretched}")
+    run_folder.write_changes(folder, config)
 
 
 class TrainingLoop:

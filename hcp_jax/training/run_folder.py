@@ -51,8 +51,17 @@ def check_resumable(folder: pathlib.Path, config: Config) -> None:
     for name, old, new in find_differences(saved, config):
         if name in _OF_ARM and is_own_file(saved) and is_own_file(config):
             raise RunFolderError(f"--resume: {folder} was started with another arm than robot={config.robot!r} is now")
-        if name not in _CHANGEABLE:
+        is_left_to_check_physics = name == "physics" and "auto" in (old, new) and read_physics(folder)
+        if name not in _CHANGEABLE and not is_left_to_check_physics:
             raise RunFolderError(f"--resume: {folder} was started with {name}={old!r}, not {new!r}")
+
+
+def check_physics(folder: pathlib.Path, physics: str) -> None:
+    """Raises RunFolderError if the run in `folder` was started on another engine than `physics`, as far as it is recorded."""
+    started = read_physics(folder)
+    if started and started != physics:
+        how = f"--config.physics={started} goes on with it"
+        raise RunFolderError(f"--resume: {folder} was started on the engine {started}, and here it is {physics}; {how}")
 
 
 def find_differences(one: Config, other: Config) -> list[tuple[str, object, object]]:
@@ -117,6 +126,14 @@ def read_config(folder: pathlib.Path) -> Config:
         raise RunFolderError(f"{path}: damaged or of another version ({error})") from error
     saved = saved_robot_path(folder, config)
     return dataclasses.replace(config, robot=str(saved), robot_base="", robot_tip="") if saved.exists() else config
+
+
+def read_physics(folder: pathlib.Path) -> str | None:
+    """The engine that a run was started on, or None where a kill kept that from being recorded."""
+    try:
+        return json.loads((folder / ENVIRONMENT_FILE).read_text()).get("physics")
+    except (OSError, ValueError):
+        return None
 
 
 def saved_robot_path(folder: pathlib.Path, config: Config) -> pathlib.Path:

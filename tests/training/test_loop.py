@@ -182,10 +182,11 @@ def test_signals_are_what_they_were_once_training_ends(finished_run, tiny_config
     assert [signal.getsignal(name) for name in (signal.SIGINT, signal.SIGTERM)] == before
 
 
-def test_a_run_goes_on_from_its_folder_alone_and_may_be_given_more_steps(finished_run, tmp_path):
+def test_a_run_goes_on_from_its_folder_alone_and_may_be_given_more_steps(finished_run, tmp_path, capsys):
     folder = shutil.copytree(finished_run, tmp_path / "run")
     train.main(["--resume", "--out", str(folder), "--config.total_env_steps=640"])
     assert [int(row["env_steps"]) for row in metrics(folder)] == [128, 256, 384, 512, 640]
+    assert "640 steps instead of 512: stretched over the new length: the decay of the step sizes\n" in capsys.readouterr().out
     assert loop.run_folder.read_config(folder).total_env_steps == 640
     assert loop.run_folder.find_differences(*(loop.run_folder.read_config(f) for f in (finished_run, folder))) == [
         ("total_env_steps", 512, 640)
