@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -200,7 +200,7 @@ class EmbeddingFitter:
         self._num_iterations = max(1, round(env_steps / config.batch_size))
         self.steps_per_robot = self._num_iterations * config.batch_size / pool.num_robots
         self._key = jax.random.fold_in(jax.random.key(config.seed), FIT)
-        self._identified: jax.Array | None = None
+        self._fitted: tuple[Any, jax.Array] | None = None  # what v_h was fitted to last, and v_h
         self._ppo = PPO(
             run.make_env(pool),
             Embedding(pool.num_robots, config.embedding.size, config.embedding.initial_scale),
@@ -213,24 +213,30 @@ class EmbeddingFitter:
         )
 
     def __call__(self, state: PPOState) -> jax.Array:
-        """v_h of the new robots under the networks of `state`, which is left as it is: [num_robots, K]."""
-        if self._identified is not None:
-            return self._identified
+        """v_h of the new robots under the networks of `state`, which is left as it is: [num_robots, K].
+
+        What it depends on stands still once the robots are identified: then it is fitted once.
+        """
         is_identified = 0 < self._identify_iterations <= int(state.iteration)
         actor = get_actor(state.params, state.obs_statistics)
         if is_identified and state.reserve is not None:
             actor = state.reserve
         mean = jnp.tile(state.params["embedding"].mean(axis=0), (self._num_robots, 1))
-        params = {"network": put_actor(actor, state.params["network"]), "embedding": mean}
-        fit_state = replicate(self._ppo.init(self._key)).replace(
-            params=copy_tree(params),
-            obs_statistics=copy_tree(actor.obs_statistics),
-            model_statistics=copy_tree(state.model_statistics),
-        )
-        v_h = self._ppo.train(fit_state, self._num_iterations).params["embedding"]
-        if is_identified:  # what it depends on stands still from here on
-            self._identified = v_h
-        return v_h
+        given = {
+            "params": {"network": put_actor(actor, state.params["network"]), "embedding": mean},
+            "obs_statistics": actor.obs_statistics,
+            "model_statistics": state.model_statistics,
+        }
+        if self._fitted is None or not is_equal(self._fitted[0], given):
+            fit_state = replicate(self._ppo.init(self._key)).replace(**copy_tree(given))
+            v_h = self._ppo.train(fit_state, self._num_iterations).params["embedding"]
+            self._fitted = jax.device_get(given), v_h
+        return self._fitted[1]
+
+
+def is_equal(one: Any, other: Any) -> bool:
+    """Whether two trees of one structure hold the same numbers."""
+    return all(jax.tree.leaves(jax.tree.map(np.array_equal, one, other)))
 
 
 def summarise(trained: Episodes, heldout: Episodes, fitted: Episodes | None) -> dict[str, float | None]:

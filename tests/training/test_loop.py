@@ -83,16 +83,17 @@ def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished_ru
     loop.run_folder.write_start(folder, tiny_config, run.physics)
     training = TrainingLoop(run, folder, checkpoints, 0)
     monkeypatch.setattr(loop, "_CHUNK_SECONDS", 0.0)
-    train_step = run.ppo.train
+    train_step = run.learner.train
 
     def train_and_interrupt(state, count):
         interrupt.requested = training._iteration + count >= cut
         return train_step(state, count)
 
-    run.ppo.train = train_and_interrupt
+    monkeypatch.setattr(run.learner, "train", train_and_interrupt)
     assert training.run(run.init_state(), interrupt) is None
     stopped = read_rows(folder / "timing.csv")
     assert int(stopped[-1]["env_steps"]) == cut * tiny_config.batch_size
+    run.fitter._fitted = None  # fits v_h again, as another process does
     loop.train(tiny_config, folder, resume=True)
     assert (folder / "metrics.csv").read_bytes() == (finished_run / "metrics.csv").read_bytes()
     seconds = [float(row["seconds"]) for row in read_rows(folder / "timing.csv")]
@@ -113,7 +114,7 @@ def test_a_jitted_call_trains_for_some_seconds_whatever_an_iteration_takes(tiny_
         clock[0] += 0.4 * loop._CHUNK_SECONDS * count if len(counts) < 4 else 10 * loop._CHUNK_SECONDS
         return state
 
-    run.ppo.train = train_for
+    monkeypatch.setattr(run.learner, "train", train_for)
     training.run(run.init_state(), Interrupt())
     assert counts == [1, 2, 2, 2, 1]
 
