@@ -325,6 +325,14 @@ def test_arms_do_not_start_from_a_policy_that_was_published_without_its_critic(f
         load_init(dataclasses.replace(tiny_arms, init=str(tmp_path)))
 
 
+def test_hoppers_do_not_start_from_a_run_that_is_still_identifying_its_robots(tiny_config, tmp_path):
+    run = loop.make_experiment(tiny_config)
+    loop.run_folder.write_start(tmp_path, tiny_config, run.physics)
+    write_policy(tmp_path, run.init_state().replace(iteration=jnp.int32(run.learner.identify_iterations - 1)))
+    with pytest.raises(CheckpointError, match="still identifying its robots; expected a run that is past its embedding.identify"):
+        load_init(dataclasses.replace(tiny_config, init=str(tmp_path)))
+
+
 def test_hoppers_do_not_start_from_an_arms_run(finished_arms, tiny_config):
     with pytest.raises(CheckpointError, match="its task is 'reacher'"):
         load_init(dataclasses.replace(tiny_config, init=str(finished_arms)))
