@@ -6,6 +6,7 @@ import pathlib
 import shutil
 import signal
 
+import jax
 import pytest
 
 from hcp_jax import benchmark, command_line, evaluate, sweep, train
@@ -241,7 +242,21 @@ def test_a_sweep_refuses_no_seeds_and_a_folder_of_another_setting(finished_run, 
     assert "two experiments of the list have this name" in fails(capsys, sweep.main, arguments)
 
 
-@pytest.mark.parametrize("error", [PhysicsOverflowError(3), ConfigError("init=x: no such folder"), OSError("no space left")])
+BREAKING = [PhysicsOverflowError(3), OSError("no space left"), jax.errors.JaxRuntimeError("RESOURCE_EXHAUSTED:\nout of memory")]
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "expected"), [*((error, 1, one_line(error)) for error in BREAKING), (KeyboardInterrupt(), 130, "interrupted")]
+)
+def test_what_breaks_a_command_is_said_in_one_line(error, code, expected, capsys):
+    with pytest.raises(SystemExit) as exit_info, command_line.user_errors_end_the_command():
+        raise error
+    said = capsys.readouterr().err
+    assert (exit_info.value.code, said.count("\n")) == (code, 1)
+    assert expected in said
+
+
+@pytest.mark.parametrize("error", [*BREAKING, ConfigError("init=x: no such folder")])
 def test_a_run_that_breaks_does_not_keep_a_sweep_from_the_others(error, tiny_config, tmp_path, capsys, monkeypatch):
     def run_experiment(config, folder, interrupt):
         if config.seed == 0:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from hcp_jax.config import Config, ConfigError, to_dict
-from hcp_jax.errors import NonFiniteError, PhysicsOverflowError, UserError, one_line
+from hcp_jax.errors import BREAKING_ERRORS, UserError, one_line
 from hcp_jax.training import loop, run_folder
 from hcp_jax.training.checkpoint import latest_iteration
 
@@ -47,7 +47,7 @@ def run_here(jobs: Sequence[Job]) -> Iterator[tuple[Job, str | None]]:
             try:
                 if not run_experiment(*job, interrupt):
                     yield job, None
-            except (PhysicsOverflowError, NonFiniteError, UserError, OSError) as error:
+            except (UserError, *BREAKING_ERRORS) as error:
                 yield job, one_line(error)
             if interrupt.requested:
                 return
