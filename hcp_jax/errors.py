@@ -12,7 +12,7 @@ class PhysicsOverflowError(RuntimeError):
 
     def __init__(self, num_steps: int):
         super().__init__(
-            f"{num_steps} control steps of single worlds overflowed a contact or constraint buffer, so their results are wrong: "
+            f"{num_steps} control steps of worlds overflowed a contact or constraint buffer, so their results are wrong: "
             "raise max_contacts or max_constraints of MjxPhysics (hcp_jax/physics/mjx.py) or the template's <size memory>"
         )
 

@@ -246,7 +246,8 @@ BREAKING = [PhysicsOverflowError(3), OSError("no space left"), jax.errors.JaxRun
 
 
 @pytest.mark.parametrize(
-    ("error", "code", "expected"), [*((error, 1, one_line(error)) for error in BREAKING), (KeyboardInterrupt(), 130, "interrupted")]
+    ("error", "code", "expected"),
+    [*((error, 1, one_line(error)) for error in BREAKING), (KeyboardInterrupt(), 130, "interrupted")],
 )
 def test_what_breaks_a_command_is_said_in_one_line(error, code, expected, capsys):
     with pytest.raises(SystemExit) as exit_info, command_line.user_errors_end_the_command():

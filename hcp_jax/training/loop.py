@@ -30,7 +30,7 @@ from hcp_jax.physics.build import resolve_physics
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import Checkpoints, latest_iteration
 from hcp_jax.training.curves import plot_curves
-from hcp_jax.training.metrics import MetricsWriter
+from hcp_jax.training.metrics import METRICS_FILE, MetricsWriter, read_column
 from hcp_jax.training.progress import Progress, format_seconds, say
 from hcp_jax.training.warm_start import load_init
 
@@ -128,9 +128,10 @@ def _run(
     if iteration > run.num_iterations:
         done, total = iteration * run.config.batch_size, run.config.total_env_steps
         raise run_folder.RunFolderError(f"--config.total_env_steps={total}: {folder} is at {done:,} steps; expected no fewer")
+    training = TrainingLoop(run, folder, checkpoints, iteration)
     if resume:
         do_in_main(lambda: _record_changes(folder, run.config))
-    return TrainingLoop(run, folder, checkpoints, iteration).run(state, interrupt)
+    return training.run(state, interrupt)
 
 
 def _record_changes(folder: pathlib.Path, config: Config) -> None:
@@ -152,6 +153,8 @@ class TrainingLoop:
         self._batch_size = config.batch_size
         self._chunk = 1  # iterations of the next jitted call
         self._eval_iterations = max(1, round(config.eval_every / self._batch_size))
+        if is_main():
+            read_column(folder / METRICS_FILE, run.best_metric)  # before the writer drops rows, and an evaluation needs it
         self._metrics = MetricsWriter(folder, self._env_steps) if is_main() else None
         self._progress = Progress(run.num_iterations * self._batch_size, self._env_steps)
 
@@ -188,14 +191,17 @@ class TrainingLoop:
         """Where a run was killed after it had saved its newest checkpoint and before it had saved that as its best one."""
         rows = self._metrics.rows() if self._metrics else []
         is_newest = bool(rows) and int(rows[-1]["env_steps"]) == self._env_steps
-        is_best = is_newest and float(rows[-1][self._run.best_metric]) >= self._best_so_far()
+        is_best = is_newest and self._best_metrics()[-1] >= self._best_so_far()
         if any_process(is_best):
             self._checkpoints.save(self._iteration, state, is_best=True)
 
     def _best_so_far(self) -> float:
         """The highest of the best metric in this process's `metrics.csv`."""
-        rows = self._metrics.rows() if self._metrics else []
-        return max((float(row[self._run.best_metric]) for row in rows), default=-math.inf)
+        return max(self._best_metrics(), default=-math.inf)
+
+    def _best_metrics(self) -> list[float]:
+        """The best metric of each evaluation so far, in the process that writes them."""
+        return read_column(self._folder / METRICS_FILE, self._run.best_metric) if self._metrics else []
 
     def _check(self, state: TrainingState) -> None:
         overflow = int(state.overflow)
