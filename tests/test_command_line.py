@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import pathlib
 import shutil
 import signal
@@ -326,14 +327,23 @@ def test_a_seed_is_a_whole_number_that_a_key_takes(seed, capsys):
     )
 
 
-def test_a_sweep_goes_on_with_a_run_that_lacks_its_last_checkpoint(finished_run, tiny_config, tmp_path, capsys):
+@pytest.mark.parametrize("lacking", ["checkpoints/newest/8", "curves.png"])
+def test_a_sweep_goes_on_with_a_run_that_lacks_what_is_written_last(lacking, finished_run, tiny_config, tmp_path, capsys):
     folder = shutil.copytree(finished_run, tmp_path / "tiny_s0")
-    shutil.rmtree(folder / "checkpoints" / "newest" / "8")
+    (shutil.rmtree if (folder / lacking).is_dir() else os.remove)(folder / lacking)
     assert not sweeping.run_experiment(tiny_config, folder)
-    assert (folder / "checkpoints" / "newest" / "8").is_dir()
+    assert (folder / lacking).exists()
     assert capsys.readouterr().out
     assert not sweeping.run_experiment(tiny_config, folder)
     assert not capsys.readouterr().out, "it is done"
+
+
+def test_a_sweep_refuses_fewer_steps_than_a_run_has_done(finished_run, tiny_config, tmp_path):
+    jobs = [(dataclasses.replace(tiny_config, total_env_steps=256), shutil.copytree(finished_run, tmp_path / "tiny_s0"))]
+    ((job, error),) = sweeping.run_here(jobs)
+    assert job == jobs[0]
+    assert "--config.total_env_steps=256: " in error
+    assert "tiny_s0 is at 512 steps; expected no fewer" in error
 
 
 @pytest.mark.parametrize(

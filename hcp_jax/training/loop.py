@@ -29,7 +29,7 @@ from hcp_jax.experiment.build import make_experiment
 from hcp_jax.physics.build import resolve_physics
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import Checkpoints, latest_iteration
-from hcp_jax.training.curves import plot_curves
+from hcp_jax.training.curves import CURVES_FILE, plot_curves
 from hcp_jax.training.metrics import METRICS_FILE, MetricsWriter, read_column
 from hcp_jax.training.progress import Progress, format_seconds, say
 from hcp_jax.training.warm_start import load_init
@@ -171,6 +171,8 @@ class TrainingLoop:
         where += f" of {num_processes} processes" if num_processes > 1 else ""
         self._progress.say(f"on {where}; compiling the training step")
         self._keep_best(state)
+        if self._metrics and self._iteration < run.num_iterations:
+            (self._folder / CURVES_FILE).unlink(missing_ok=True)  # a sweep takes it for the end of the run
         while self._iteration < run.num_iterations:
             next_eval = min((self._iteration // self._eval_iterations + 1) * self._eval_iterations, run.num_iterations)
             count = min(self._chunk, next_eval - self._iteration)
@@ -272,5 +274,5 @@ class TrainingLoop:
         self._checkpoints.close()
         if self._metrics:
             self._metrics.close()
-            plot_curves(self._folder, self._folder / "curves.png")
+            plot_curves(self._folder, self._folder / CURVES_FILE)
         self._progress.say(f"done in {format_seconds(self._progress.elapsed)}: {self._folder}")

@@ -194,6 +194,17 @@ def test_a_run_goes_on_from_its_folder_alone_and_may_be_given_more_steps(finishe
     ]
 
 
+def test_a_run_that_goes_on_has_no_picture_of_its_end(finished_run, tiny_config, tmp_path, monkeypatch):
+    folder = shutil.copytree(finished_run, tmp_path / "run")
+    config = dataclasses.replace(tiny_config, total_env_steps=640)
+    run = loop.make_experiment(tiny_config)
+    monkeypatch.setattr(run.learner, "train", lambda state, count: state)
+    interrupt = Interrupt(requested=True)
+    run = dataclasses.replace(run, config=config, num_iterations=10)
+    assert loop._run(run, run.init_state(), folder, resume=True, interrupt=interrupt) is None
+    assert not (folder / "curves.png").exists()
+
+
 def test_a_run_is_not_given_fewer_steps_than_it_has_done(finished_run, tiny_config, tmp_path):
     folder = shutil.copytree(finished_run, tmp_path / "run")
     with pytest.raises(loop.run_folder.RunFolderError, match=r"total_env_steps=256: .*run is at 512 steps; expected no fewer"):
