@@ -82,7 +82,24 @@ BAD_ARGUMENTS = {
     ),
     "an arm that holds a peg": (
         ["--config", REACHER, "--config.pool.left_out=('K',)"],
+        "pool.left_out='K': expected types A to I",
+    ),
+    "an arm that holds a peg, to train on": (
+        ["--config", REACHER, "--config.pool.types=('A','K')"],
         "pool.types='K': expected types A to I",
+    ),
+    "a hole for the reacher": (
+        ["--config", REACHER, "--config.env.random_hole=0.2"],
+        "env.random_hole=0.2: expected 0 for the reacher",
+    ),
+    "a tip without an arm": (["--config", REACHER, "--config.robot_tip=hand"], "robot_tip='hand': expected none without robot"),
+    "a base of the hopper": (
+        ["--config", HOPPER, "--config.robot_base=foot"],
+        "robot_base='foot': expected none for the hopper",
+    ),
+    "a width of actions that is none": (
+        ["--config", HOPPER, "--config.ppo.initial_log_std=nan"],
+        "ppo.initial_log_std=nan: expected a finite number",
     ),
     "a random chain with a peg": (
         ["--config", PEG, "--config.pool.types=('R7',)"],
@@ -400,6 +417,8 @@ def test_a_checkpoint_of_another_architecture_is_refused(finished_run, tiny_conf
     (other / "config.json").write_text(json.dumps(config))
     assert "another architecture" in fails(capsys, evaluate.main, [str(other), "--trials", "1", "--robots-per-trial", "2"])
     path = tiny_experiment(tmp_path, tiny_config)
+    line = fails(capsys, train.main, ["--resume", "--out", str(other)])
+    assert f"{other}/checkpoints/newest/8: another architecture" in line
     arguments = ["--config", path, "--out", str(tmp_path / "new"), f"--config.init={finished_run}"]
     assert "another architecture" in fails(capsys, train.main, [*arguments, "--config.ppo.hidden_sizes=(16,16)"])
     assert not (tmp_path / "new").exists()

@@ -26,7 +26,8 @@ from hcp_jax.policies.conditioning import Conditioning, Embedding, Encoding
 
 @dataclasses.dataclass(frozen=True)
 class HopperExperiment:
-    """A config's objects. The evaluator's pool holds training robots 0..eval_robots-1, then as many held-out ones."""
+    """A config's objects. The evaluator's pool holds the first training robots, then as many held-out ones: `eval_robots` of
+    each, or as many as the smaller pool has."""
 
     config: Config
     physics: str
