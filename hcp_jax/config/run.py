@@ -119,7 +119,7 @@ class Config:
                 require(name not in unfit, f"pool.{field}", name, allowed)
 
     def _check_ppo(self) -> None:
-        batch = self.batch_size
+        batch = self.steps_per_iteration
         if batch % self.ppo.num_minibatches:
             raise ConfigError(
                 f"ppo.num_minibatches={self.ppo.num_minibatches}: must divide num_envs * ppo.unroll_length = "
@@ -151,10 +151,10 @@ class Config:
     @property
     def num_iterations(self) -> int:
         """Of the run."""
-        return -(-self.total_env_steps // self.batch_size)
+        return -(-self.total_env_steps // self.steps_per_iteration)
 
     @property
-    def batch_size(self) -> int:
+    def steps_per_iteration(self) -> int:
         """Control steps per iteration."""
         steps = self.ppo.unroll_length if self.algorithm == "ppo" else self.env.episode_length
         return self.resolved_num_envs * steps

@@ -122,11 +122,11 @@ def _run(
         iteration, state, skipped = checkpoints.restore(state)
         for line in skipped:
             say(line)
-        say(f"resuming at {iteration * run.config.batch_size:,} steps")
+        say(f"resuming at {iteration * run.config.steps_per_iteration:,} steps")
     elif resume:
         say("the run ended before its first checkpoint: starting again")
-    if iteration > run.num_iterations:
-        done, total = iteration * run.config.batch_size, run.config.total_env_steps
+    if iteration > run.config.num_iterations:
+        done, total = iteration * run.config.steps_per_iteration, run.config.total_env_steps
         raise run_folder.RunFolderError(f"--config.total_env_steps={total}: {folder} is at {done:,} steps; expected no fewer")
     training = TrainingLoop(run, folder, checkpoints, iteration)
     if resume:
@@ -150,17 +150,17 @@ class TrainingLoop:
     def __init__(self, run: Experiment, folder: pathlib.Path, checkpoints: Checkpoints, iteration: int):
         config = run.config
         self._run, self._folder, self._checkpoints, self._iteration = run, folder, checkpoints, iteration
-        self._batch_size = config.batch_size
+        self._steps_per_iteration = config.steps_per_iteration
         self._chunk = 1  # iterations of the next jitted call
-        self._eval_iterations = max(1, round(config.eval_every / self._batch_size))
+        self._eval_iterations = max(1, round(config.eval_every / self._steps_per_iteration))
         if is_main():
             read_column(folder / METRICS_FILE, run.best_metric)  # before the writer drops rows, and an evaluation needs it
         self._metrics = MetricsWriter(folder, self._env_steps) if is_main() else None
-        self._progress = Progress(run.num_iterations * self._batch_size, self._env_steps)
+        self._progress = Progress(run.config.num_iterations * self._steps_per_iteration, self._env_steps)
 
     @property
     def _env_steps(self) -> int:
-        return self._iteration * self._batch_size
+        return self._iteration * self._steps_per_iteration
 
     def run(self, state: TrainingState, interrupt: Interrupt) -> dict[str, float] | None:
         run, metrics = self._run, None
@@ -171,10 +171,10 @@ class TrainingLoop:
         where += f" of {num_processes} processes" if num_processes > 1 else ""
         self._progress.say(f"on {where}; compiling the training step")
         self._keep_best(state)
-        if self._metrics and self._iteration < run.num_iterations:
+        if self._metrics and self._iteration < run.config.num_iterations:
             (self._folder / CURVES_FILE).unlink(missing_ok=True)  # a sweep takes it for the end of the run
-        while self._iteration < run.num_iterations:
-            next_eval = min((self._iteration // self._eval_iterations + 1) * self._eval_iterations, run.num_iterations)
+        while self._iteration < run.config.num_iterations:
+            next_eval = min((self._iteration // self._eval_iterations + 1) * self._eval_iterations, run.config.num_iterations)
             count = min(self._chunk, next_eval - self._iteration)
             began = time.monotonic()
             state = run.learner.train(state, count)
@@ -184,7 +184,7 @@ class TrainingLoop:
             self._progress.update(self._env_steps, run.describe(state))
             if self._iteration == next_eval:
                 state, metrics = self._evaluate(state)
-            if any_process(interrupt.requested) and self._iteration < run.num_iterations:
+            if any_process(interrupt.requested) and self._iteration < run.config.num_iterations:
                 return self._save_and_stop(state)
         self._finish()
         return metrics
@@ -220,7 +220,7 @@ class TrainingLoop:
             scalars = {name: np.round(values[row], 4).tolist() for name, values in pool.hardware.items() if values.ndim == 2}
             robots.append(f"robot {pool.robot_id[row]} in {counts[row]} of them ({scalars})")
         newest = self._checkpoints.iterations()
-        kept = f"{newest[-1] * self._batch_size:,} steps" if newest else "none"
+        kept = f"{newest[-1] * self._steps_per_iteration:,} steps" if newest else "none"
         return (
             f"{int(state.skipped.longest)} updates in a row had a loss or gradient that is not finite and were skipped, before "
             f"{self._env_steps:,} steps; last checkpoint: {kept}; {'; '.join(robots)}"

@@ -92,7 +92,7 @@ def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished_ru
     monkeypatch.setattr(run.learner, "train", train_and_interrupt)
     assert training.run(run.init_state(), interrupt) is None
     stopped = read_rows(folder / "timing.csv")
-    assert int(stopped[-1]["env_steps"]) == cut * tiny_config.batch_size
+    assert int(stopped[-1]["env_steps"]) == cut * tiny_config.steps_per_iteration
     run.fitter._fitted = None  # fits v_h again, as another process does
     loop.train(tiny_config, folder, resume=True)
     assert (folder / "metrics.csv").read_bytes() == (finished_run / "metrics.csv").read_bytes()
@@ -200,7 +200,7 @@ def test_a_run_that_goes_on_has_no_picture_of_its_end(finished_run, tiny_config,
     run = loop.make_experiment(tiny_config)
     monkeypatch.setattr(run.learner, "train", lambda state, count: state)
     interrupt = Interrupt(requested=True)
-    run = dataclasses.replace(run, config=config, num_iterations=10)
+    run = dataclasses.replace(run, config=config)
     assert loop._run(run, run.init_state(), folder, resume=True, interrupt=interrupt) is None
     assert not (folder / "curves.png").exists()
 
@@ -251,7 +251,7 @@ def test_a_warm_start_identifies_its_robots_under_the_old_actor_with_the_old_for
     jax.tree.map(np.testing.assert_array_equal, get_actor(state.params, state.obs_statistics), source.reserve)
     hidden = np.asarray(state.reserve.network["policy"]["hidden_1"]["kernel"])
     start = np.asarray(state.params["embedding"])
-    state = run.ppo.train(jax.tree.map(jnp.copy, state), run.ppo.identify_iterations)
+    state = run.learner.train(jax.tree.map(jnp.copy, state), run.learner.identify_iterations)
     models = [params["network"]["params"]["forward_model"] for params in (state.params, source.params)]
     jax.tree.map(np.testing.assert_array_equal, *models)
     np.testing.assert_array_equal(state.params["network"]["params"]["policy"]["hidden_1"]["kernel"], hidden)
