@@ -79,12 +79,7 @@ def with_passes(run: Run, number: int) -> tuple[Callable, object]:
     if isinstance(learner, DDPG):
         changed = dataclasses.replace(config.ddpg, updates_per_iteration=number, warmup_episodes=0)
         changed_learner = DDPG(
-            learner.env,
-            learner.conditioning,
-            changed,
-            learner.num_envs,
-            run.config.num_iterations,
-            config.embedding.learning_rate,
+            learner.env, learner.conditioning, changed, learner.num_envs, config.num_iterations, config.embedding.learning_rate
         )
     else:
         changed = dataclasses.replace(config.ppo, num_epochs=number)
