@@ -84,9 +84,7 @@ def with_passes(run: Run, number: int) -> tuple[Callable, object]:
     else:
         changed = dataclasses.replace(config.ppo, num_epochs=number)
         embedding = dataclasses.replace(config.embedding, identify_steps=0)
-        changed_learner = PPO(
-            learner.env, learner.conditioning, changed, embedding, learner.num_envs, run.config.num_iterations
-        )
+        changed_learner = PPO(learner.env, learner.conditioning, changed, embedding, learner.num_envs, config.num_iterations)
     return changed_learner.train, replicate(changed_learner.init(jax.random.key(config.seed)))
 
 
