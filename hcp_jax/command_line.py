@@ -16,11 +16,11 @@ from ml_collections import ConfigDict, config_flags
 from rich.console import Console
 
 from hcp_jax.config import MAX_SEED, Config, ConfigError, field_names, from_dict, to_dict, unknown_field
-from hcp_jax.errors import NonFiniteError, PhysicsOverflowError, UserError, one_line
+from hcp_jax.errors import BREAKING_ERRORS, UserError, one_line
 from hcp_jax.hardware.catalogue import catalogue_names
 from hcp_jax.physics.base import INTEGRATORS, PHYSICS
 
-BAD_INPUT, BROKEN = 2, 1
+BAD_INPUT, BROKEN, INTERRUPTED = 2, 1, 130
 OWN_ARM = f"your arm, a URDF or MJCF file (see hcp_jax.robot check), or one of {', '.join(catalogue_names())}"
 _RUN_BY = {"get_config": "hcp_jax.train", "get_configs": "hcp_jax.sweep"}  # what an experiment file defines
 _OVERRIDE = re.compile(r"--config\.([^=\s]+)(=.*)?$", re.DOTALL)
@@ -38,18 +38,19 @@ class OneLineParser(argparse.ArgumentParser):
 
 @contextlib.contextmanager
 def user_errors_end_the_command() -> Iterator[None]:
-    """Bad input ends the process with one line on stderr and exit code 2, what broke on the way with one and exit code 1."""
+    """Bad input ends the process with one line on stderr and exit code 2, what broke on the way with one and exit code 1,
+    Ctrl-C with one and exit code 130."""
     try:
         yield
     except UserError as error:
         print(one_line(error), file=sys.stderr)
         sys.exit(BAD_INPUT)
-    except (PhysicsOverflowError, NonFiniteError) as error:
+    except BREAKING_ERRORS as error:
         print(one_line(error), file=sys.stderr)
         sys.exit(BROKEN)
-    except OSError as error:
-        print(one_line(error), file=sys.stderr)
-        sys.exit(BROKEN)
+    except KeyboardInterrupt:
+        print("interrupted; what was not saved is lost", file=sys.stderr)
+        sys.exit(INTERRUPTED)
 
 
 def new_output(word: str) -> pathlib.Path:

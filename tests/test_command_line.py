@@ -2,10 +2,12 @@
 
 import dataclasses
 import json
+import os
 import pathlib
 import shutil
 import signal
 
+import jax
 import pytest
 
 from hcp_jax import benchmark, command_line, evaluate, sweep, train
@@ -15,6 +17,7 @@ from hcp_jax.training import sweeping
 
 EXPERIMENTS = pathlib.Path(__file__).resolve().parents[1] / "experiments"
 HOPPER = str(EXPERIMENTS / "hopper_ppo.py")
+HCPI = str(EXPERIMENTS / "hopper_embedding.py")
 REACHER = str(EXPERIMENTS / "reacher_hcpe_leave_h.py")
 PEG = str(EXPERIMENTS / "peg_jacobian_leave_h.py")
 POLICY = EXPERIMENTS.parent / "results" / "policies" / "reacher_hcpe_leave_h_s0"
@@ -79,7 +82,24 @@ BAD_ARGUMENTS = {
     ),
     "an arm that holds a peg": (
         ["--config", REACHER, "--config.pool.left_out=('K',)"],
+        "pool.left_out='K': expected types A to I",
+    ),
+    "an arm that holds a peg, to train on": (
+        ["--config", REACHER, "--config.pool.types=('A','K')"],
         "pool.types='K': expected types A to I",
+    ),
+    "a hole for the reacher": (
+        ["--config", REACHER, "--config.env.random_hole=0.2"],
+        "env.random_hole=0.2: expected 0 for the reacher",
+    ),
+    "a tip without an arm": (["--config", REACHER, "--config.robot_tip=hand"], "robot_tip='hand': expected none without robot"),
+    "a base of the hopper": (
+        ["--config", HOPPER, "--config.robot_base=foot"],
+        "robot_base='foot': expected none for the hopper",
+    ),
+    "a width of actions that is none": (
+        ["--config", HOPPER, "--config.ppo.initial_log_std=nan"],
+        "ppo.initial_log_std=nan: expected a finite number",
     ),
     "a random chain with a peg": (
         ["--config", PEG, "--config.pool.types=('R7',)"],
@@ -124,6 +144,10 @@ BAD_ARGUMENTS = {
     "identification by ddpg": (
         ["--config", REACHER, "--config.embedding.identify_steps=1000"],
         "embedding.identify_steps=1000: expected 0 for ddpg",
+    ),
+    "nothing but identification": (
+        ["--config", HCPI, "--config.embedding.identify_steps=5000000"],
+        "embedding.identify_steps=5000000: must leave an iteration (32000 steps) of total_env_steps=5000000",
     ),
     "more robots than ids": (
         ["--config", REACHER, "--config.pool.robots_per_type=10001"],
@@ -236,7 +260,22 @@ def test_a_sweep_refuses_no_seeds_and_a_folder_of_another_setting(finished_run, 
     assert "two experiments of the list have this name" in fails(capsys, sweep.main, arguments)
 
 
-@pytest.mark.parametrize("error", [PhysicsOverflowError(3), ConfigError("init=x: no such folder"), OSError("no space left")])
+BREAKING = [PhysicsOverflowError(3), OSError("no space left"), jax.errors.JaxRuntimeError("RESOURCE_EXHAUSTED:\nout of memory")]
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "expected"),
+    [*((error, 1, one_line(error)) for error in BREAKING), (KeyboardInterrupt(), 130, "interrupted")],
+)
+def test_what_breaks_a_command_is_said_in_one_line(error, code, expected, capsys):
+    with pytest.raises(SystemExit) as exit_info, command_line.user_errors_end_the_command():
+        raise error
+    said = capsys.readouterr().err
+    assert (exit_info.value.code, said.count("\n")) == (code, 1)
+    assert expected in said
+
+
+@pytest.mark.parametrize("error", [*BREAKING, ConfigError("init=x: no such folder")])
 def test_a_run_that_breaks_does_not_keep_a_sweep_from_the_others(error, tiny_config, tmp_path, capsys, monkeypatch):
     def run_experiment(config, folder, interrupt):
         if config.seed == 0:
@@ -305,14 +344,23 @@ def test_a_seed_is_a_whole_number_that_a_key_takes(seed, capsys):
     )
 
 
-def test_a_sweep_goes_on_with_a_run_that_lacks_its_last_checkpoint(finished_run, tiny_config, tmp_path, capsys):
+@pytest.mark.parametrize("lacking", ["checkpoints/newest/8", "curves.png"])
+def test_a_sweep_goes_on_with_a_run_that_lacks_what_is_written_last(lacking, finished_run, tiny_config, tmp_path, capsys):
     folder = shutil.copytree(finished_run, tmp_path / "tiny_s0")
-    shutil.rmtree(folder / "checkpoints" / "newest" / "8")
+    (shutil.rmtree if (folder / lacking).is_dir() else os.remove)(folder / lacking)
     assert not sweeping.run_experiment(tiny_config, folder)
-    assert (folder / "checkpoints" / "newest" / "8").is_dir()
+    assert (folder / lacking).exists()
     assert capsys.readouterr().out
     assert not sweeping.run_experiment(tiny_config, folder)
     assert not capsys.readouterr().out, "it is done"
+
+
+def test_a_sweep_refuses_fewer_steps_than_a_run_has_done(finished_run, tiny_config, tmp_path):
+    jobs = [(dataclasses.replace(tiny_config, total_env_steps=256), shutil.copytree(finished_run, tmp_path / "tiny_s0"))]
+    ((job, error),) = sweeping.run_here(jobs)
+    assert job == jobs[0]
+    assert "--config.total_env_steps=256: " in error
+    assert "tiny_s0 is at 512 steps; expected no fewer" in error
 
 
 @pytest.mark.parametrize(
@@ -369,6 +417,8 @@ def test_a_checkpoint_of_another_architecture_is_refused(finished_run, tiny_conf
     (other / "config.json").write_text(json.dumps(config))
     assert "another architecture" in fails(capsys, evaluate.main, [str(other), "--trials", "1", "--robots-per-trial", "2"])
     path = tiny_experiment(tmp_path, tiny_config)
+    line = fails(capsys, train.main, ["--resume", "--out", str(other)])
+    assert f"{other}/checkpoints/newest/8: another architecture" in line
     arguments = ["--config", path, "--out", str(tmp_path / "new"), f"--config.init={finished_run}"]
     assert "another architecture" in fails(capsys, train.main, [*arguments, "--config.ppo.hidden_sizes=(16,16)"])
     assert not (tmp_path / "new").exists()

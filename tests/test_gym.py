@@ -82,18 +82,38 @@ def test_rewards_for_another_goal_are_those_of_the_task(arms):
     np.testing.assert_allclose(hit - reward, 2.0, atol=1e-6)
 
 
+def put_at_goal(arms, row: int, speed: float = 0.0) -> None:
+    """Moves a world's goal to where its point of interest is, and sets its joints' velocities [rad/s]."""
+    goal = arms._state.goal
+    physics = goal.physics.replace(qvel=goal.physics.qvel.at[row].set(speed))
+    desired_goal = goal.desired_goal.at[row].set(goal.achieved_goal[row])
+    arms._state = arms._state.replace(goal=goal.replace(physics=physics, desired_goal=desired_goal))
+
+
+def test_a_diverged_world_ends_and_has_not_succeeded_though_it_stands_at_its_goal(arms):
+    arms.reset(seed=0)
+    put_at_goal(arms, 2, speed=1e12)
+    *_, terminated, _, infos = arms.step(np.zeros((NUM_ENVS, 7)))
+    assert terminated[2]
+    assert not infos["is_success"][2]
+
+
 def test_an_episode_ends_at_success_and_otherwise_with_its_time(arms):
     arms.reset(seed=3)
     lengths = np.zeros(NUM_ENVS, int)
-    ended = []
-    for _ in range(201):
+    ended, num_successes = [], 0
+    for step in range(201):
+        if step == 100:
+            put_at_goal(arms, 1)
         *_, terminated, truncated, infos = arms.step(np.zeros((NUM_ENVS, 7)))
+        num_successes += infos["is_success"].sum()
         lengths += 1
         np.testing.assert_array_equal(terminated, infos["is_success"])
         ended += lengths[truncated].tolist()
         assert (lengths[truncated] == 200).all()
         lengths[terminated | truncated] = 0
     assert ended
+    assert num_successes
 
 
 def test_held_out_worlds_are_of_other_robots_and_of_the_types_left_out():

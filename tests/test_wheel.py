@@ -35,7 +35,8 @@ def test_an_installed_wheel_trains_for_one_iteration_outside_the_checkout(instal
         "from hcp_jax.config import Config, from_dict\n"
         f"def get_config():\n    return from_dict(Config, {to_dict(tiny_config)!r})\n"
     )
-    arguments = ["--config", "experiment.py", "--config.total_env_steps=64", "--config.embedding.fit_steps=0"]
+    without = ["--config.embedding.identify_steps=0", "--config.embedding.fit_steps=0"]
+    arguments = ["--config", "experiment.py", "--config.total_env_steps=64", *without]
     result = subprocess.run(
         [installed_python, "-m", "hcp_jax.train", *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
     )

@@ -23,7 +23,7 @@ from hcp_jax.algorithms.guard import Skipped, apply_update, init_skipped
 from hcp_jax.algorithms.her import relabel_goals
 from hcp_jax.algorithms.optimizers import make_ddpg_optimizer
 from hcp_jax.algorithms.replay import EpisodeBatch, Replay, StepSample, add_episodes, episode_shapes, init_replay, sample_steps
-from hcp_jax.algorithms.returns import sum_rewards
+from hcp_jax.algorithms.returns import compute_n_step_returns
 from hcp_jax.config import DDPGConfig
 from hcp_jax.devices import options_for_batch, put_everywhere, split_rows
 from hcp_jax.policies.networks import Critic, DeterministicActor, JointActor, JointCritic
@@ -272,7 +272,7 @@ class DDPG:
         """
         frozen = jax.lax.stop_gradient(params)
         reward, success = self.env.compute_reward(sample.achieved_goal, goal[:, None], sample.action)
-        reward, discount = sum_rewards(reward, success, sample.num_steps, self.config.gamma)
+        reward, discount = compute_n_step_returns(reward, success, sample.num_steps, self.config.gamma)
 
         def inputs(embedding, obs):
             return self.normalize(self.conditioning.inputs(embedding, sample.index, obs, goal), statistics)

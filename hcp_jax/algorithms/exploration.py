@@ -87,7 +87,7 @@ class Explorer:
             index=first.index,
             length=jnp.sum(~is_over, axis=0, dtype=jnp.int32),
         )
-        succeeded = jnp.any(transitions.success, axis=0).astype(jnp.float32)
+        succeeded = jnp.any(transitions.success & ~ended, axis=0).astype(jnp.float32)
         return Exploration(
             episodes=episodes,
             failure=update_failure(failure, first.index, 1.0 - succeeded),

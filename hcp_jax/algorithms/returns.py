@@ -36,7 +36,9 @@ def compute_gae(
     return advantages, advantages + value
 
 
-def sum_rewards(reward: jax.Array, success: jax.Array, num_steps: jax.Array, gamma: float) -> tuple[jax.Array, jax.Array]:
+def compute_n_step_returns(
+    reward: jax.Array, success: jax.Array, num_steps: jax.Array, gamma: float
+) -> tuple[jax.Array, jax.Array]:
     """The discounted rewards of runs of K steps until the first success, and what the value after them counts for.
 
     Args:

@@ -47,7 +47,7 @@ def benchmark_learner(config: Config, seconds: float) -> list[dict]:
         passes, updates_per_pass, batch_size = config.ddpg.updates_per_iteration, 1, config.ddpg.batch_size
     else:
         passes, updates_per_pass = config.ppo.num_epochs, config.ppo.num_minibatches
-        batch_size = config.batch_size // updates_per_pass
+        batch_size = config.steps_per_iteration // updates_per_pass
     num_timed = max(2, passes)
     collect, learn = (time_iteration(*with_passes(run, number), seconds) for number in (1, num_timed))
     each_pass = (learn - collect) / (num_timed - 1)
@@ -58,7 +58,7 @@ def benchmark_learner(config: Config, seconds: float) -> list[dict]:
     bare = 1.0 / time_steps(make_bare_products(products, options), seconds)[0] / updates_per_pass
 
     def collecting_row(name: str, duration: float) -> dict:
-        speed = round(config.batch_size / duration, 1)
+        speed = round(config.steps_per_iteration / duration, 1)
         return {"name": name, **common, "seconds": round(duration, 4), "control_steps_per_s": speed}
 
     def learning_row(name: str, duration: float) -> dict:
@@ -79,12 +79,12 @@ def with_passes(run: Run, number: int) -> tuple[Callable, object]:
     if isinstance(learner, DDPG):
         changed = dataclasses.replace(config.ddpg, updates_per_iteration=number, warmup_episodes=0)
         changed_learner = DDPG(
-            learner.env, learner.conditioning, changed, learner.num_envs, run.num_iterations, config.embedding.learning_rate
+            learner.env, learner.conditioning, changed, learner.num_envs, config.num_iterations, config.embedding.learning_rate
         )
     else:
         changed = dataclasses.replace(config.ppo, num_epochs=number)
         embedding = dataclasses.replace(config.embedding, identify_steps=0)
-        changed_learner = PPO(learner.env, learner.conditioning, changed, embedding, learner.num_envs, run.num_iterations)
+        changed_learner = PPO(learner.env, learner.conditioning, changed, embedding, learner.num_envs, config.num_iterations)
     return changed_learner.train, replicate(changed_learner.init(jax.random.key(config.seed)))
 
 

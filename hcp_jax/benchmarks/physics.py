@@ -122,7 +122,7 @@ def make_policy(run: ArmExperiment | HopperExperiment) -> Callable:
     state = run.init_state()
     if isinstance(run, HopperExperiment):
         v_h = train_v_h(run, state.params)
-        return lambda s: run.ppo.mean_action(state.params["network"], state.obs_statistics, s.obs, v_h[s.index])
+        return lambda s: run.learner.mean_action(state.params["network"], state.obs_statistics, s.obs, v_h[s.index])
     learner = run.learner
     return lambda s: learner.mean_action(state.params, state.statistics, learner.conditioning, s.index, s.obs, s.desired_goal)
 

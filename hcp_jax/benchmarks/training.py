@@ -38,7 +38,7 @@ def samples_per_step(config: Config) -> float:
     """Gradient samples for each collected control step."""
     if config.task == "hopper":
         return float(config.ppo.num_epochs)
-    return config.ddpg.updates_per_iteration * config.ddpg.batch_size / config.batch_size
+    return config.ddpg.updates_per_iteration * config.ddpg.batch_size / config.steps_per_iteration
 
 
 def benchmark_training(config: Config, rows: Sequence[str], seconds: float) -> Iterator[dict]:
@@ -203,13 +203,13 @@ def start_ours(config: Config) -> Callable[[], tuple[int, float]]:
     """A function that trains until the config's next evaluation and returns control steps so far and success in percent."""
     run = make_experiment(config)
     assert isinstance(run, ArmExperiment)
-    state, iterations = run.init_state(), max(1, round(config.eval_every / config.batch_size))
+    state, iterations = run.init_state(), max(1, round(config.eval_every / config.steps_per_iteration))
 
     def learn() -> tuple[int, float]:
         nonlocal state
         state = run.learner.train(state, jnp.int32(iterations))
         success = run.evaluate(state)[0]["train_types_success"]
-        return int(state.iteration) * config.batch_size, float(success or 0.0)
+        return int(state.iteration) * config.steps_per_iteration, float(success or 0.0)
 
     return learn
 

@@ -19,8 +19,8 @@ class EmbeddingConfig:
         learning_rate: Adam's step for the embedding, decayed like the networks' or to 0 over the identification.
         model_learning_rate: Adam's step for the forward model, decayed to 0 over the identification.
         identify_steps: control steps of identification; rounded to whole iterations.
-        fit_steps: control steps of each held-out robot for fitting its v_h at every evaluation, with the networks frozen; 0
-            does not fit.
+        fit_steps: control steps of each held-out robot (hopper) for fitting its v_h at every evaluation, with the networks
+            frozen; 0 does not fit.
     """
 
     size: int = 32

@@ -1,6 +1,7 @@
 """Settings of PPO."""
 
 import dataclasses
+import math
 
 from hcp_jax.config.checks import is_at_least_zero, is_positive, require
 
@@ -52,6 +53,7 @@ class PPOConfig:
             require(is_positive(getattr(self, name)), f"ppo.{name}", getattr(self, name), "a number above 0")
         for name in ("final_learning_rate", "value_clip_eps", "value_cost", "entropy_cost"):
             require(is_at_least_zero(getattr(self, name)), f"ppo.{name}", getattr(self, name), "a number of at least 0")
+        require(math.isfinite(self.initial_log_std), "ppo.initial_log_std", self.initial_log_std, "a finite number")
         for name in ("gamma", "gae_lambda"):
             require(0.0 <= getattr(self, name) <= 1.0, f"ppo.{name}", getattr(self, name), "a number in [0, 1]")
         require(

@@ -33,7 +33,8 @@ class Config:
             `chain_fk`, `chain_fk+jacobian`, `chain_fk+jacobian+dynamics`, `dynamics`, `chain+dynamics`, `random`, `embedding`,
             `none+end_effector` or `none+goal_offset`.
         eval_every: control steps between evaluations, which also write a checkpoint; rounded to whole iterations.
-        eval_robots: hoppers of the training pool, and at most as many held-out ones, in an evaluation.
+        eval_robots: hoppers of the training pool, and as many held-out ones, in an evaluation; at most as many of each as the
+            smaller pool has.
         keep_checkpoints: newest checkpoints kept beside the best one.
         max_skipped_updates: updates in a row whose loss or gradient is not finite, and which are skipped, that end the run.
         init: run folder whose layers and observation statistics this run starts from; empty starts from scratch.
@@ -94,7 +95,8 @@ class Config:
         kinds = (HopperPoolConfig, HopperConfig) if self.task == "hopper" else (ArmPoolConfig, ArmConfig)
         for field, kind in zip(("pool", "env"), kinds, strict=True):
             require(isinstance(getattr(self, field), kind), field, getattr(self, field), f"{kind.__name__} for {self.task}")
-        require(not self.robot or self.task != "hopper", "robot", self.robot, "none for the hopper")
+        for field in ("robot", "robot_base", "robot_tip"):
+            require(not getattr(self, field) or self.task != "hopper", field, getattr(self, field), "none for the hopper")
 
     def _check_arms(self, pool: ArmPoolConfig) -> None:
         if self.robot:
@@ -105,21 +107,29 @@ class Config:
             require(self.encoding in allowed, "encoding", self.encoding, f"one of {', '.join(allowed)}")
         else:
             require(len(pool.types) >= 1, "pool.types", pool.types, "at least 1 type, or an arm's file in robot")
+            for field in ("robot_base", "robot_tip"):
+                require(not getattr(self, field), field, getattr(self, field), "none without robot")
+        unfit, allowed = CHAIN_TYPES, "types A to K for peg_insertion"
         if self.task == "reacher":
-            for name in (*pool.types, *pool.left_out):
-                require(name not in OTHER_ARMS, "pool.types", name, "types A to I, R4 to R7 for the reacher (J, K hold a peg)")
-            assert isinstance(self.env, ArmConfig)
-            require(self.env.approach_starts == 0, "env.approach_starts", self.env.approach_starts, "0 for the reacher")
-        else:
-            for name in (*pool.types, *pool.left_out):
-                require(name not in CHAIN_TYPES, "pool.types", name, "types A to K for peg_insertion")
+            unfit, allowed = OTHER_ARMS, "types A to I, R4 to R7 for the reacher (J, K hold a peg)"
+            for field in ("random_hole", "approach_starts"):
+                require(getattr(self.env, field) == 0, f"env.{field}", getattr(self.env, field), "0 for the reacher")
+        for field in ("types", "left_out"):
+            for name in getattr(pool, field):
+                require(name not in unfit, f"pool.{field}", name, allowed)
 
     def _check_ppo(self) -> None:
-        batch = self.batch_size
+        batch = self.steps_per_iteration
         if batch % self.ppo.num_minibatches:
             raise ConfigError(
                 f"ppo.num_minibatches={self.ppo.num_minibatches}: must divide num_envs * ppo.unroll_length = "
                 f"{self.resolved_num_envs} * {self.ppo.unroll_length} = {batch}"
+            )
+        identify_steps = self.embedding.identify_steps
+        if self.encoding == "embedding" and -(-identify_steps // batch) >= self.num_iterations:  # the policy starts after it
+            raise ConfigError(
+                f"embedding.identify_steps={identify_steps}: must leave an iteration ({batch} steps) of "
+                f"total_env_steps={self.total_env_steps}"
             )
 
     def _check_ddpg(self) -> None:
@@ -139,7 +149,12 @@ class Config:
         return self.num_envs or self.pool.num_robots
 
     @property
-    def batch_size(self) -> int:
+    def num_iterations(self) -> int:
+        """Of the run."""
+        return -(-self.total_env_steps // self.steps_per_iteration)
+
+    @property
+    def steps_per_iteration(self) -> int:
         """Control steps per iteration."""
         steps = self.ppo.unroll_length if self.algorithm == "ppo" else self.env.episode_length
         return self.resolved_num_envs * steps

@@ -95,7 +95,7 @@ def describe_source(config: Config, folder: pathlib.Path, iteration: int) -> dic
         "task": config.task,
         "algorithm": config.algorithm,
         "encoding": config.encoding,
-        "checkpoint_env_steps": iteration * config.batch_size,
+        "checkpoint_env_steps": iteration * config.steps_per_iteration,
         "commit": run_folder.read_commit(),
         "jax": jax.__version__,
     }

@@ -78,14 +78,14 @@ def _arm_entries(robot: ChosenRobot) -> Entries:
 def _hopper_policy(run: HopperExperiment, state: Any, robot: ChosenRobot) -> Callable[[jax.Array], jax.Array]:
     row = robot.trained_row
     v_h = heldout_v_h(run, state.params, robot.pool)[:1] if row is None else train_v_h(run, state.params)[row : row + 1]
-    v_h = run.ppo.visible(state, v_h)
+    v_h = run.learner.visible(state, v_h)
     num_positions = 2 + len(robot.joints)
 
     def act(obs: jax.Array) -> jax.Array:
         position, velocity = jnp.split(obs, [num_positions])
         velocity = jnp.clip(velocity, -MAX_OBSERVED_VELOCITY, MAX_OBSERVED_VELOCITY)
         observed = jnp.concatenate([position, velocity])[None]
-        return run.ppo.mean_action(state.params["network"], state.obs_statistics, observed, v_h)[0]
+        return run.learner.mean_action(state.params["network"], state.obs_statistics, observed, v_h)[0]
 
     return act
 

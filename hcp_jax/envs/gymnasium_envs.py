@@ -165,7 +165,7 @@ class GoalVectorEnv(_VectorEnv[GoalEnv]):
             "terminated": terminated,
             "truncated": truncated,
             "final_obs": self._observe(state),
-            "is_success": transition.success,
+            "is_success": transition.success & ~transition.diverged,
             "action": transition.action,
         }
 

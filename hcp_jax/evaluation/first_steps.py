@@ -43,16 +43,16 @@ def regress_v_h(
     Raises:
         ConfigError: the run has identified no robots, or a number of steps is below 1.
     """
-    if not run.ppo.identify_iterations or int(state.iteration) < run.ppo.identify_iterations:
+    if not run.learner.identify_iterations or int(state.iteration) < run.learner.identify_iterations:
         what = "expected a run with embedding.identify_steps above 0 that is past them"
         raise ConfigError(f"--first-steps: {run.config.name} has no forward model to regress v_h with; {what}")
     if min(steps) < 1:
         raise ConfigError(f"--first-steps={min(steps)}: expected at least 1")
     # Of a state that was loaded the other fields hold shapes alone.
     state = state.replace(**{field.name: None for field in dataclasses.fields(state) if field.name not in state.policy_fields})
-    variables, actions = jax.jit(act, static_argnums=(0, 1, 3))(run.ppo, run.make_env(pool), state, max(steps), key)
+    variables, actions = jax.jit(act, static_argnums=(0, 1, 3))(run.learner, run.make_env(pool), state, max(steps), key)
     fit = jax.jit(fit_v_h, static_argnums=0)
-    return {n: fit(run.ppo, state, variables[:n], actions[:n], key) for n in steps}
+    return {n: fit(run.learner, state, variables[:n], actions[:n], key) for n in steps}
 
 
 def act(ppo: PPO, env: PoolEnv, state: PPOState, num_steps: int, key: jax.Array) -> tuple[jax.Array, jax.Array]:

@@ -95,7 +95,7 @@ def write_embedding(folder: pathlib.Path, out: pathlib.Path) -> str:
     embedding, mass = np.asarray(state.params["embedding"]), run.train_pool.hardware["body_mass"][:, 0]
     record = {
         "run": folder.name,
-        "env_steps": iteration * run.config.batch_size,
+        "env_steps": iteration * run.config.steps_per_iteration,
         "neighbours": 5,
         "folds": 5,
         "r2": round(knn_r2(embedding, mass), 4),

@@ -100,7 +100,7 @@ def choose_sets(
     sets = {"train": (run.train_pool, index, train_v_h(run, state.params)[index])}
     sets["heldout"] = (heldout, new, heldout_v_h(run, state.params, heldout)[new])
     fit_steps = config.embedding.fit_steps if fit_steps is None else fit_steps
-    if run.ppo.conditioning.is_learned and fit_steps:
+    if run.learner.conditioning.is_learned and fit_steps:
         fitter = EmbeddingFitter(run, heldout, fit_steps)
         each = f"{fitter.steps_per_robot:,.0f} control steps each"
         print(f"fitting v_h of {heldout.num_robots} new robots, {each}, networks frozen", flush=True)
@@ -113,6 +113,6 @@ def play_trials(
 ) -> list[Episodes]:
     """One episode of each of `rows`, all in one jitted call, split into `trials` equal parts."""
     params = (state.params["network"], state.obs_statistics)
-    episodes = make_evaluator(run.ppo, run.make_env(pool))(params, run.ppo.visible(state, v_h), rows, key)
+    episodes = make_evaluator(run.learner, run.make_env(pool))(params, run.learner.visible(state, v_h), rows, key)
     parts = np.split(np.arange(len(rows)), trials)
     return [episodes.take(part) for part in parts]

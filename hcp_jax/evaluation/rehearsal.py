@@ -103,7 +103,7 @@ def rehearse(
         "run": str(folder),
         "robot": robot.name,
         "encoding": config.encoding,
-        "checkpoint_env_steps": iteration * config.batch_size,
+        "checkpoint_env_steps": iteration * config.steps_per_iteration,
         "commit": run_folder.read_commit(),
         "seed": seed,
         "conditions": {},

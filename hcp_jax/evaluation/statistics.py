@@ -33,7 +33,7 @@ def describe_evaluation(
         "encoding": config.encoding,
         "physics": run.physics,
         "integrator": chosen_integrator(run.physics, config.env.integrator),
-        "checkpoint_env_steps": iteration * config.batch_size,
+        "checkpoint_env_steps": iteration * config.steps_per_iteration,
         "best": best,
         "seed": seed,
         "commit": run_folder.read_commit(),

@@ -9,7 +9,7 @@ from typing import ClassVar
 import jax
 import numpy as np
 
-from hcp_jax.algorithms.ddpg import DDPG, DDPGState
+from hcp_jax.algorithms.ddpg import DDPG, LOSS_METRICS, DDPGState
 from hcp_jax.algorithms.replay import replay_bytes
 from hcp_jax.config import ArmConfig, ArmPoolConfig, Config, ConfigError
 from hcp_jax.devices import replicate
@@ -41,7 +41,6 @@ class ArmExperiment:
     heldout_pool: RobotPool
     learner: DDPG
     make_env: Callable[..., GoalEnv]
-    num_iterations: int
     evaluator: GoalEvaluator
     trained_evaluator: GoalEvaluator | None
     best_metric: ClassVar[str] = "train_types_success"
@@ -97,7 +96,7 @@ class ArmExperiment:
         return {
             "exploring_success": 100.0 * sums["successes"] / episodes,
             "exploring_final_distance": sums["final_distance"] / episodes,
-            **{name: sums[name] / updates for name in ("critic_loss", "actor_loss", "q")},
+            **{name: sums[name] / updates for name in LOSS_METRICS},
         }
 
     def describe(self, state: DDPGState) -> str:
@@ -132,13 +131,12 @@ def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:
     starts_pool = train_pool
     if env_config.approach_starts:
         starts_pool = add_approach_poses(train_pool, np.asarray(HOLE), env_config.random_hole, pools.seed)
-    num_iterations = -(-config.total_env_steps // config.batch_size)
     learner = DDPG(
         make_env(starts_pool, approach_starts=env_config.approach_starts),
         make_goal_conditioning(config, train_pool, train_pool),
         config.ddpg,
         config.resolved_num_envs,
-        num_iterations,
+        config.num_iterations,
         config.embedding.learning_rate,
         learns_statistics=not config.init,
     )
@@ -147,8 +145,7 @@ def make_arm_experiment(config: Config, physics: str) -> ArmExperiment:
     trained_evaluator = None
     if config.encoding == "embedding":
         trained_evaluator = make_evaluator(config, learner, make_env, train_pool, train_pool)
-    common = (learner, make_env, num_iterations)
-    return ArmExperiment(config, physics, train_pool, heldout_pool, *common, evaluator, trained_evaluator)
+    return ArmExperiment(config, physics, train_pool, heldout_pool, learner, make_env, evaluator, trained_evaluator)
 
 
 def check_memory(config: Config, num_bytes: int) -> None:

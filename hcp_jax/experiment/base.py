@@ -42,8 +42,6 @@ class Experiment(Protocol):
     @property
     def make_env(self) -> Callable[..., Any]: ...  # of a pool
     @property
-    def num_iterations(self) -> int: ...
-    @property
     def learner(self) -> Learner: ...
     def robot_inputs(self, pool: RobotPool) -> Callable[[jax.Array, jax.Array], jax.Array]:
         """What an agent sees of robots at index [B] of `pool` and of their obs [B, O], but for goals: [B, K]."""

@@ -3,14 +3,14 @@
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from hcp_jax.algorithms.identification import get_actor, put_actor
-from hcp_jax.algorithms.ppo import PPO, Params, PPOState
+from hcp_jax.algorithms.ppo import LOSS_METRICS, PPO, Params, PPOState
 from hcp_jax.config import Config, HopperConfig, HopperPoolConfig
 from hcp_jax.devices import copy_tree, replicate
 from hcp_jax.envs.base import PoolEnv
@@ -26,22 +26,18 @@ from hcp_jax.policies.conditioning import Conditioning, Embedding, Encoding
 
 @dataclasses.dataclass(frozen=True)
 class HopperExperiment:
-    """A config's objects. The evaluator's pool holds training robots 0..eval_robots-1, then as many held-out ones."""
+    """A config's objects. The evaluator's pool holds the first training robots, then as many held-out ones: `eval_robots` of
+    each, or as many as the smaller pool has."""
 
     config: Config
     physics: str
     train_pool: RobotPool
     heldout_pool: RobotPool
-    ppo: PPO
+    learner: PPO
     make_env: Callable[..., PoolEnv]
     evaluator: Evaluator
-    num_iterations: int
     fitter: "EmbeddingFitter | None" = None
     best_metric: ClassVar[str] = "train_return_mean"
-
-    @property
-    def learner(self) -> PPO:
-        return self.ppo
 
     @property
     def num_evaluated(self) -> int:
@@ -53,14 +49,14 @@ class HopperExperiment:
         return lambda index, obs: jnp.concatenate([obs, table[index]], axis=-1)
 
     def init_state(self) -> PPOState:
-        return replicate(self.ppo.init(jax.random.fold_in(jax.random.key(self.config.seed), TRAIN)))
+        return replicate(self.learner.init(jax.random.fold_in(jax.random.key(self.config.seed), TRAIN)))
 
     def introduce(self, iteration: int) -> list[str]:
         """Lines to say before training goes on from `iteration`."""
         config = self.config
         lines = [f"{config.resolved_num_envs} environments, physics {self.physics}, encoding {config.encoding}"]
-        if iteration < self.ppo.identify_iterations:
-            steps = self.ppo.identify_iterations * config.batch_size
+        if iteration < self.learner.identify_iterations:
+            steps = self.learner.identify_iterations * config.steps_per_iteration
             lines.append(f"identifying robots for {steps:,} steps; after that the policy starts afresh and sees v_h")
         return lines
 
@@ -78,11 +74,10 @@ class HopperExperiment:
         """Means since the last evaluation."""
         sums = {name: float(value) for name, value in state.sums.items()}
         iterations, episodes = max(sums["iterations"], 1.0), sums["episodes"]
-        means = ("policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "prediction_loss")
         return {
             "episode_return": sums["episode_return"] / episodes if episodes else math.nan,
             "episode_length": sums["episode_length"] / episodes if episodes else math.nan,
-            **{name: sums[name] / iterations for name in means},
+            **{name: sums[name] / iterations for name in LOSS_METRICS},
             "explained_variance": 1.0 - sums["value_error"] / max(sums["target_variance"], 1e-12),
         }
 
@@ -109,20 +104,19 @@ def make_hopper_experiment(config: Config, physics: str) -> HopperExperiment:
     def make_env(pool: RobotPool, engine: str = physics) -> PoolEnv:
         return PoolEnv(task, pool, make_physics(engine, pool, task.sim_dt, config.env.integrator))
 
-    num_iterations = -(-config.total_env_steps // config.batch_size)
     ppo = PPO(
         make_env(train_pool),
         make_conditioning(config, train_pool),
         config.ppo,
         config.embedding,
         config.resolved_num_envs,
-        num_iterations,
+        config.num_iterations,
         train_forward_model=not config.init,
     )
     rows = np.arange(min(config.eval_robots, train_pool.num_robots, heldout_pool.num_robots))
     evaluation_pool = concatenate_pools(train_pool.subset(rows), heldout_pool.subset(rows))
     evaluator = make_evaluator(ppo, make_env(evaluation_pool))
-    run = HopperExperiment(config, physics, train_pool, heldout_pool, ppo, make_env, evaluator, num_iterations)
+    run = HopperExperiment(config, physics, train_pool, heldout_pool, ppo, make_env, evaluator)
     if ppo.conditioning.is_learned and config.embedding.fit_steps:
         run = dataclasses.replace(run, fitter=EmbeddingFitter(run, heldout_pool, config.embedding.fit_steps))
     return run
@@ -152,7 +146,7 @@ def make_conditioning(config: Config, train_pool: RobotPool) -> Conditioning:
 
 def train_v_h(run: HopperExperiment, params: Params) -> jax.Array:
     """v_h of every training robot: [N, K]."""
-    return run.ppo.conditioning.v_h(params["embedding"], jnp.arange(run.train_pool.num_robots))
+    return run.learner.conditioning.v_h(params["embedding"], jnp.arange(run.train_pool.num_robots))
 
 
 def heldout_v_h(run: HopperExperiment, params: Params, pool: RobotPool | None = None) -> jax.Array:
@@ -170,7 +164,7 @@ def evaluate_run(run: HopperExperiment, state: PPOState, heldout: jax.Array | No
     """One deterministic episode of each evaluated robot: those trained on, and held-out ones with v_h `heldout` [M, K]."""
     count = run.num_evaluated
     heldout = heldout_v_h(run, state.params) if heldout is None else heldout
-    v_h = run.ppo.visible(state, jnp.concatenate([train_v_h(run, state.params)[:count], heldout[:count]]))
+    v_h = run.learner.visible(state, jnp.concatenate([train_v_h(run, state.params)[:count], heldout[:count]]))
     policy_params = (state.params["network"], state.obs_statistics)
     episodes = run.evaluator(policy_params, v_h, np.arange(2 * count), jax.random.key(EVALUATION_SEED))
     return episodes.take(slice(0, count)), episodes.take(slice(count, None))
@@ -195,12 +189,12 @@ class EmbeddingFitter:
         """
         config = run.config
         env_steps = steps_per_robot * pool.num_robots
-        self._identify_iterations = run.ppo.identify_iterations
+        self._identify_iterations = run.learner.identify_iterations
         self._num_robots = pool.num_robots
-        self._num_iterations = max(1, round(env_steps / config.batch_size))
-        self.steps_per_robot = self._num_iterations * config.batch_size / pool.num_robots
+        self._num_iterations = max(1, round(env_steps / config.steps_per_iteration))
+        self.steps_per_robot = self._num_iterations * config.steps_per_iteration / pool.num_robots
         self._key = jax.random.fold_in(jax.random.key(config.seed), FIT)
-        self._identified: jax.Array | None = None
+        self._fitted: tuple[Any, jax.Array] | None = None  # what v_h was fitted to last, and v_h
         self._ppo = PPO(
             run.make_env(pool),
             Embedding(pool.num_robots, config.embedding.size, config.embedding.initial_scale),
@@ -213,24 +207,30 @@ class EmbeddingFitter:
         )
 
     def __call__(self, state: PPOState) -> jax.Array:
-        """v_h of the new robots under the networks of `state`, which is left as it is: [num_robots, K]."""
-        if self._identified is not None:
-            return self._identified
+        """v_h of the new robots under the networks of `state`, which is left as it is: [num_robots, K].
+
+        What it depends on stands still once the robots are identified: then it is fitted once.
+        """
         is_identified = 0 < self._identify_iterations <= int(state.iteration)
         actor = get_actor(state.params, state.obs_statistics)
         if is_identified and state.reserve is not None:
             actor = state.reserve
         mean = jnp.tile(state.params["embedding"].mean(axis=0), (self._num_robots, 1))
-        params = {"network": put_actor(actor, state.params["network"]), "embedding": mean}
-        fit_state = replicate(self._ppo.init(self._key)).replace(
-            params=copy_tree(params),
-            obs_statistics=copy_tree(actor.obs_statistics),
-            model_statistics=copy_tree(state.model_statistics),
-        )
-        v_h = self._ppo.train(fit_state, self._num_iterations).params["embedding"]
-        if is_identified:  # what it depends on stands still from here on
-            self._identified = v_h
-        return v_h
+        given = {
+            "params": {"network": put_actor(actor, state.params["network"]), "embedding": mean},
+            "obs_statistics": actor.obs_statistics,
+            "model_statistics": state.model_statistics,
+        }
+        if self._fitted is None or not is_equal(self._fitted[0], given):
+            fit_state = replicate(self._ppo.init(self._key)).replace(**copy_tree(given))
+            v_h = self._ppo.train(fit_state, self._num_iterations).params["embedding"]
+            self._fitted = jax.device_get(given), v_h
+        return self._fitted[1]
+
+
+def is_equal(one: Any, other: Any) -> bool:
+    """Whether two trees of one structure hold the same numbers."""
+    return all(jax.tree.leaves(jax.tree.map(np.array_equal, one, other)))
 
 
 def summarise(trained: Episodes, heldout: Episodes, fitted: Episodes | None) -> dict[str, float | None]:

@@ -139,9 +139,9 @@ def record_hoppers(run: HopperExperiment, state, robots: Sequence[Choice], key: 
     pool = make_chosen_pool(run, robots)
     new, known = heldout_v_h(run, state.params, pool), train_v_h(run, state.params)
     v_h = jnp.stack([known[robot.row] if robot.kind == TRAINED else new[i] for i, robot in enumerate(robots)])
-    evaluator = make_hopper_evaluator(run.ppo, run.make_env(pool))
+    evaluator = make_hopper_evaluator(run.learner, run.make_env(pool))
     params = (state.params["network"], state.obs_statistics)
-    episodes, states = evaluator.record(params, run.ppo.visible(state, v_h), np.arange(len(robots)), key)
+    episodes, states = evaluator.record(params, run.learner.visible(state, v_h), np.arange(len(robots)), key)
     task = evaluator.env.task
     ctrl_dt = task.sim_dt * task.num_substeps
     is_short = episodes.episode_length < task.episode_length

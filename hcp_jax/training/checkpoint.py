@@ -149,7 +149,7 @@ class Checkpoints:
         metadata = manager.item_metadata(iteration).state
         saved = {leaf_name(path): tuple(leaf.shape) for path, leaf in jax.tree_util.tree_leaves_with_path(metadata.tree)
                  if hasattr(leaf, "shape")}  # fmt: skip
-        check_architecture(saved, template, f"{self.folder}/{iteration}")
+        check_architecture(saved, template, f"{manager.directory / str(iteration)}")
 
 
 def latest_iteration(folder: pathlib.Path) -> int | None:

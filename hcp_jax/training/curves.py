@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from hcp_jax.training.metrics import METRICS_FILE, read_rows
 
+CURVES_FILE = "curves.png"  # what a run writes last
 _SERIES = {
     "train_return_mean": "training robots",
     "heldout_return_mean": "held-out robots",

@@ -26,10 +26,11 @@ from hcp_jax.errors import NonFiniteError, PhysicsOverflowError
 from hcp_jax.experiment.arm import load_own_robot
 from hcp_jax.experiment.base import Experiment, TrainingState
 from hcp_jax.experiment.build import make_experiment
+from hcp_jax.physics.build import resolve_physics
 from hcp_jax.training import run_folder
 from hcp_jax.training.checkpoint import Checkpoints, latest_iteration
-from hcp_jax.training.curves import plot_curves
-from hcp_jax.training.metrics import MetricsWriter
+from hcp_jax.training.curves import CURVES_FILE, plot_curves
+from hcp_jax.training.metrics import METRICS_FILE, MetricsWriter, read_column
 from hcp_jax.training.progress import Progress, format_seconds, say
 from hcp_jax.training.warm_start import load_init
 
@@ -80,7 +81,7 @@ def train(
         PhysicsOverflowError: the physics dropped contacts or constraints.
         NonFiniteError: losses or gradients stopped being finite; the newest checkpoint is from before.
     """
-    do_in_main(lambda: run_folder.check_resumable(folder, config) if resume else run_folder.check_new(folder))
+    do_in_main(lambda: _check_folder(folder, config, resume))
     if config.robot:
         load_own_robot(config)  # what is wrong with it is said before all else is compiled
     goes_on = resume and latest_iteration(folder / run_folder.CHECKPOINT_FOLDER) is not None
@@ -102,6 +103,15 @@ def train(
         return _run(run, state, folder, resume, held.enter_context(Interrupt().installed()) if interrupt is None else interrupt)
 
 
+def _check_folder(folder: pathlib.Path, config: Config, resume: bool) -> None:
+    """Raises RunFolderError where the run cannot start, or go on, in `folder`."""
+    if resume:
+        run_folder.check_resumable(folder, config)
+        run_folder.check_physics(folder, resolve_physics(config.physics))
+    else:
+        run_folder.check_new(folder)
+
+
 def _run(
     run: Experiment, state: TrainingState, folder: pathlib.Path, resume: bool, interrupt: Interrupt
 ) -> dict[str, float] | None:
@@ -112,15 +122,26 @@ def _run(
         iteration, state, skipped = checkpoints.restore(state)
         for line in skipped:
             say(line)
-        say(f"resuming at {iteration * run.config.batch_size:,} steps")
+        say(f"resuming at {iteration * run.config.steps_per_iteration:,} steps")
     elif resume:
         say("the run ended before its first checkpoint: starting again")
-    if iteration > run.num_iterations:
-        done, total = iteration * run.config.batch_size, run.config.total_env_steps
+    if iteration > run.config.num_iterations:
+        done, total = iteration * run.config.steps_per_iteration, run.config.total_env_steps
         raise run_folder.RunFolderError(f"--config.total_env_steps={total}: {folder} is at {done:,} steps; expected no fewer")
+    training = TrainingLoop(run, folder, checkpoints, iteration)
     if resume:
-        do_in_main(lambda: run_folder.write_changes(folder, run.config))
-    return TrainingLoop(run, folder, checkpoints, iteration).run(state, interrupt)
+        do_in_main(lambda: _record_changes(folder, run.config))
+    return training.run(state, interrupt)
+
+
+def _record_changes(folder: pathlib.Path, config: Config) -> None:
+    """Writes what a resumed run changes, and says what more steps mean for its schedules."""
+    before = run_folder.read_config(folder).total_env_steps
+    if config.total_env_steps > before:
+        switch = config.algorithm == "ddpg" and config.ddpg.n_step > 1 and config.ddpg.n_step_from > 0.0
+        stretched = "the decay of the step sizes" + (f" and the switch to {config.ddpg.n_step}-step returns" if switch else "")
+        say(f"{config.total_env_steps:,} steps instead of {before:,}: stretched over the new length: {stretched}")
+    run_folder.write_changes(folder, config)
 
 
 class TrainingLoop:
@@ -129,15 +150,17 @@ class TrainingLoop:
     def __init__(self, run: Experiment, folder: pathlib.Path, checkpoints: Checkpoints, iteration: int):
         config = run.config
         self._run, self._folder, self._checkpoints, self._iteration = run, folder, checkpoints, iteration
-        self._batch_size = config.batch_size
+        self._steps_per_iteration = config.steps_per_iteration
         self._chunk = 1  # iterations of the next jitted call
-        self._eval_iterations = max(1, round(config.eval_every / self._batch_size))
+        self._eval_iterations = max(1, round(config.eval_every / self._steps_per_iteration))
+        if is_main():
+            read_column(folder / METRICS_FILE, run.best_metric)  # before the writer drops rows, and an evaluation needs it
         self._metrics = MetricsWriter(folder, self._env_steps) if is_main() else None
-        self._progress = Progress(run.num_iterations * self._batch_size, self._env_steps)
+        self._progress = Progress(run.config.num_iterations * self._steps_per_iteration, self._env_steps)
 
     @property
     def _env_steps(self) -> int:
-        return self._iteration * self._batch_size
+        return self._iteration * self._steps_per_iteration
 
     def run(self, state: TrainingState, interrupt: Interrupt) -> dict[str, float] | None:
         run, metrics = self._run, None
@@ -148,8 +171,10 @@ class TrainingLoop:
         where += f" of {num_processes} processes" if num_processes > 1 else ""
         self._progress.say(f"on {where}; compiling the training step")
         self._keep_best(state)
-        while self._iteration < run.num_iterations:
-            next_eval = min((self._iteration // self._eval_iterations + 1) * self._eval_iterations, run.num_iterations)
+        if self._metrics and self._iteration < run.config.num_iterations:
+            (self._folder / CURVES_FILE).unlink(missing_ok=True)  # a sweep takes it for the end of the run
+        while self._iteration < run.config.num_iterations:
+            next_eval = min((self._iteration // self._eval_iterations + 1) * self._eval_iterations, run.config.num_iterations)
             count = min(self._chunk, next_eval - self._iteration)
             began = time.monotonic()
             state = run.learner.train(state, count)
@@ -159,7 +184,7 @@ class TrainingLoop:
             self._progress.update(self._env_steps, run.describe(state))
             if self._iteration == next_eval:
                 state, metrics = self._evaluate(state)
-            if any_process(interrupt.requested) and self._iteration < run.num_iterations:
+            if any_process(interrupt.requested) and self._iteration < run.config.num_iterations:
                 return self._save_and_stop(state)
         self._finish()
         return metrics
@@ -168,14 +193,17 @@ class TrainingLoop:
         """Where a run was killed after it had saved its newest checkpoint and before it had saved that as its best one."""
         rows = self._metrics.rows() if self._metrics else []
         is_newest = bool(rows) and int(rows[-1]["env_steps"]) == self._env_steps
-        is_best = is_newest and float(rows[-1][self._run.best_metric]) >= self._best_so_far()
+        is_best = is_newest and self._best_metrics()[-1] >= self._best_so_far()
         if any_process(is_best):
             self._checkpoints.save(self._iteration, state, is_best=True)
 
     def _best_so_far(self) -> float:
         """The highest of the best metric in this process's `metrics.csv`."""
-        rows = self._metrics.rows() if self._metrics else []
-        return max((float(row[self._run.best_metric]) for row in rows), default=-math.inf)
+        return max(self._best_metrics(), default=-math.inf)
+
+    def _best_metrics(self) -> list[float]:
+        """The best metric of each evaluation so far, in the process that writes them."""
+        return read_column(self._folder / METRICS_FILE, self._run.best_metric) if self._metrics else []
 
     def _check(self, state: TrainingState) -> None:
         overflow = int(state.overflow)
@@ -192,7 +220,7 @@ class TrainingLoop:
             scalars = {name: np.round(values[row], 4).tolist() for name, values in pool.hardware.items() if values.ndim == 2}
             robots.append(f"robot {pool.robot_id[row]} in {counts[row]} of them ({scalars})")
         newest = self._checkpoints.iterations()
-        kept = f"{newest[-1] * self._batch_size:,} steps" if newest else "none"
+        kept = f"{newest[-1] * self._steps_per_iteration:,} steps" if newest else "none"
         return (
             f"{int(state.skipped.longest)} updates in a row had a loss or gradient that is not finite and were skipped, before "
             f"{self._env_steps:,} steps; last checkpoint: {kept}; {'; '.join(robots)}"
@@ -246,5 +274,5 @@ class TrainingLoop:
         self._checkpoints.close()
         if self._metrics:
             self._metrics.close()
-            plot_curves(self._folder, self._folder / "curves.png")
+            plot_curves(self._folder, self._folder / CURVES_FILE)
         self._progress.say(f"done in {format_seconds(self._progress.elapsed)}: {self._folder}")

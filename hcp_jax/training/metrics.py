@@ -24,10 +24,11 @@ class MetricsWriter:
     """
 
     def __init__(self, folder: pathlib.Path, resume_env_steps: int = 0):
+        """Raises RunFolderError if a file is damaged or of another version; neither has changed then."""
         self._folder = folder
-        for name in (METRICS_FILE, TIMING_FILE):
-            rows = [row for row in read_rows(folder / name) if int(row["env_steps"]) <= resume_env_steps]
-            _write_rows(folder / name, rows)
+        before = {name: read_rows(folder / name) for name in (METRICS_FILE, TIMING_FILE)}
+        for name, rows in before.items():
+            _write_rows(folder / name, [row for row in rows if int(row["env_steps"]) <= resume_env_steps])
         timing = read_rows(folder / TIMING_FILE)
         self.seconds_before = float(timing[-1].get("seconds") or 0.0) if timing else 0.0
         self._events = tensorboardX.SummaryWriter(str(folder / "events"), purge_step=resume_env_steps + 1)
@@ -46,8 +47,12 @@ class MetricsWriter:
         self._append(TIMING_FILE, timing)
 
     def _append(self, name: str, record: dict[str, Any]) -> None:
-        row = {key: _format(value) for key, value in record.items()}
-        _write_rows(self._folder / name, [*read_rows(self._folder / name), row])
+        path, row = self._folder / name, {key: _format(value) for key, value in record.items()}
+        rows = read_rows(path)
+        unknown = next((column for column in dict(*rows[:1]) if column not in row), None)
+        if unknown:
+            raise _damaged(path, f"column {unknown} is none that this run has")
+        _write_rows(path, [*rows, row])
 
     def rows(self) -> list[dict[str, str]]:
         """The evaluations so far."""
@@ -58,20 +63,37 @@ class MetricsWriter:
 
 
 def read_rows(path: pathlib.Path) -> list[dict[str, str]]:
-    """Rows of a run's CSV file; none if it does not exist. Raises RunFolderError if it is damaged."""
+    """Rows of a run's CSV file, all of the same columns; none if it does not exist. Raises RunFolderError if it is damaged."""
     if not path.exists():
         return []
     try:
         with path.open(newline="") as file:
             rows = list(csv.DictReader(file))
     except (csv.Error, UnicodeDecodeError) as error:
-        raise RunFolderError(f"{path}: damaged or of another version ({error})") from error
+        raise _damaged(path, str(error)) from error
     for row in rows:
-        if not (row.get("env_steps") or "").isdecimal():
-            raise RunFolderError(
-                f"{path}: damaged or of another version (env_steps={row.get('env_steps')!r}: expected a whole number)"
-            )
+        steps = row.get("env_steps")
+        if not (steps or "").isdecimal():
+            raise _damaged(path, f"env_steps={steps!r}: expected a whole number")
+        missing = next((column for column, value in row.items() if value is None), None)
+        if missing:
+            raise _damaged(path, f"the row of env_steps={steps} has no {missing}")
+        if None in row:
+            raise _damaged(path, f"the row of env_steps={steps} has more columns than are named, after {list(row)[-2]}")
     return rows
+
+
+def read_column(path: pathlib.Path, column: str) -> list[float]:
+    """One column of a run's CSV file. Raises RunFolderError if it is missing or not of numbers."""
+    values = [row.get(column) for row in read_rows(path)]
+    try:
+        return [float(value or "") for value in values]
+    except ValueError as error:
+        raise _damaged(path, f"column {column}: expected a number in each row") from error
+
+
+def _damaged(path: pathlib.Path, what: str) -> RunFolderError:
+    return RunFolderError(f"{path}: damaged or of another version ({what})")
 
 
 def _write_rows(path: pathlib.Path, rows: list[dict[str, str]]) -> None:

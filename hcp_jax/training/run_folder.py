@@ -49,10 +49,19 @@ def check_resumable(folder: pathlib.Path, config: Config) -> None:
     if (folder / POLICY_FILE).exists():
         raise RunFolderError(f"--resume: {folder} is a published policy; start a new run from it with --config.init={folder}")
     for name, old, new in find_differences(saved, config):
-        if name in _OF_ARM and saved.robot and config.robot:
+        if name in _OF_ARM and is_own_file(saved) and is_own_file(config):
             raise RunFolderError(f"--resume: {folder} was started with another arm than robot={config.robot!r} is now")
-        if name not in _CHANGEABLE:
+        is_left_to_check_physics = name == "physics" and "auto" in (old, new) and read_physics(folder)
+        if name not in _CHANGEABLE and not is_left_to_check_physics:
             raise RunFolderError(f"--resume: {folder} was started with {name}={old!r}, not {new!r}")
+
+
+def check_physics(folder: pathlib.Path, physics: str) -> None:
+    """Raises RunFolderError if the run in `folder` was started on another engine than `physics`, as far as it is recorded."""
+    started = read_physics(folder)
+    if started and started != physics:
+        how = f"--config.physics={started} goes on with it"
+        raise RunFolderError(f"--resume: {folder} was started on the engine {started}, and here it is {physics}; {how}")
 
 
 def find_differences(one: Config, other: Config) -> list[tuple[str, object, object]]:
@@ -65,11 +74,19 @@ def find_differences(one: Config, other: Config) -> list[tuple[str, object, obje
     return [(name, old.get(name), new.get(name)) for name in old | new if name not in same and old.get(name) != new.get(name)]
 
 
-def identify_arm(config: Config) -> str | dict:
-    """What `config.robot` is: a name of the catalogue, what somebody's file says, or nothing. Raises RobotFileError."""
-    if config.robot in ("", *catalogue_names()):
-        return config.robot
-    return describe_robot(load_own_robot(config))
+def identify_arm(config: Config) -> dict:
+    """What `config.robot` is: a name of the catalogue with base and tip, empty ones of no arm, or what somebody's file says.
+
+    Raises RobotFileError.
+    """
+    if is_own_file(config):
+        return describe_robot(load_own_robot(config))
+    return {name: getattr(config, name) for name in _OF_ARM}
+
+
+def is_own_file(config: Config) -> bool:
+    """Whether `config.robot` is somebody's file, and neither a name of the catalogue nor empty."""
+    return config.robot not in ("", *catalogue_names())
 
 
 @contextlib.contextmanager
@@ -111,6 +128,14 @@ def read_config(folder: pathlib.Path) -> Config:
     return dataclasses.replace(config, robot=str(saved), robot_base="", robot_tip="") if saved.exists() else config
 
 
+def read_physics(folder: pathlib.Path) -> str | None:
+    """The engine that a run was started on, or None where a kill kept that from being recorded."""
+    try:
+        return json.loads((folder / ENVIRONMENT_FILE).read_text()).get("physics")
+    except (OSError, ValueError):
+        return None
+
+
 def saved_robot_path(folder: pathlib.Path, config: Config) -> pathlib.Path:
     """Where a run folder keeps the arm that `config.robot` names, if that is somebody's file."""
     return folder / ROBOT_FOLDER / f"{pathlib.Path(config.robot).stem}.json"
@@ -121,7 +146,7 @@ def write_start(folder: pathlib.Path, config: Config, physics: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / CONFIG_FILE).write_text(json.dumps(to_dict(config), indent=2) + "\n")
     (folder / ENVIRONMENT_FILE).write_text(json.dumps(describe_environment(physics), indent=2) + "\n")
-    if config.robot and config.robot not in catalogue_names():
+    if is_own_file(config):
         save_robot(load_own_robot(config), saved_robot_path(folder, config))
 
 

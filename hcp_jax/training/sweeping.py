@@ -5,9 +5,10 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from hcp_jax.config import Config, ConfigError, to_dict
-from hcp_jax.errors import NonFiniteError, PhysicsOverflowError, UserError, one_line
+from hcp_jax.errors import BREAKING_ERRORS, UserError, one_line
 from hcp_jax.training import loop, run_folder
 from hcp_jax.training.checkpoint import latest_iteration
+from hcp_jax.training.curves import CURVES_FILE
 
 MAX_RETRIES = 3
 
@@ -28,12 +29,15 @@ def check_jobs(jobs: Sequence[Job]) -> None:
 
 def run_experiment(config: Config, folder: pathlib.Path, interrupt: loop.Interrupt | None = None) -> bool:
     """Trains, resumes or skips one experiment. Returns whether it was interrupted before its end."""
-    resume = (folder / run_folder.CONFIG_FILE).exists()
-    if resume:
-        iterations = latest_iteration(folder / run_folder.CHECKPOINT_FOLDER) or 0
-        if iterations * config.batch_size >= config.total_env_steps:
-            return False
-    return loop.train(config, folder, resume, interrupt) is None
+    if not is_done(config, folder):
+        loop.train(config, folder, (folder / run_folder.CONFIG_FILE).exists(), interrupt)
+    return not is_done(config, folder)
+
+
+def is_done(config: Config, folder: pathlib.Path) -> bool:
+    """Whether a run has all its steps and what it writes last."""
+    iterations = latest_iteration(folder / run_folder.CHECKPOINT_FOLDER)
+    return iterations == config.num_iterations and (folder / CURVES_FILE).exists()
 
 
 def run_here(jobs: Sequence[Job]) -> Iterator[tuple[Job, str | None]]:
@@ -47,7 +51,7 @@ def run_here(jobs: Sequence[Job]) -> Iterator[tuple[Job, str | None]]:
             try:
                 if not run_experiment(*job, interrupt):
                     yield job, None
-            except (PhysicsOverflowError, NonFiniteError, UserError, OSError) as error:
+            except (UserError, *BREAKING_ERRORS) as error:
                 yield job, one_line(error)
             if interrupt.requested:
                 return

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from hcp_jax.algorithms.ddpg import DDPGState
 from hcp_jax.algorithms.identification import get_actor, put_actor
-from hcp_jax.algorithms.ppo import PPOState
+from hcp_jax.algorithms.ppo import PPO, PPOState
 from hcp_jax.config import Config
 from hcp_jax.devices import copy_tree
 from hcp_jax.experiment.base import TrainingState
@@ -27,8 +27,8 @@ def load_init(config: Config) -> Callable[[Any, TrainingState], TrainingState]:
     `all`; every robot's own v_h is new.
 
     Raises:
-        RunFolderError, CheckpointError: that run cannot be read, its hidden layers do not fit `config`, or it is a policy that
-            was published without its critic.
+        RunFolderError, CheckpointError: that run cannot be read, its hidden layers do not fit `config`, it is still identifying
+            its robots, or it is a policy that was published without its critic.
     """
     folder = pathlib.Path(config.init)
     source_config = run_folder.read_config(folder)
@@ -39,7 +39,11 @@ def load_init(config: Config) -> Callable[[Any, TrainingState], TrainingState]:
     identified = {bool(each.embedding.identify_steps) for each in (source_config, config)}
     if config.encoding == "embedding" and len(identified) > 1:
         raise CheckpointError(f"init={config.init}: its v_h was learned in another way (embedding.identify_steps)")
-    source = load_policy(folder, make_experiment(source_config))[1]
+    run = make_experiment(source_config)
+    iteration, source = load_policy(folder, run)
+    if isinstance(run.learner, PPO) and iteration < run.learner.identify_iterations:  # the actor to go on with is untrained
+        steps = f"embedding.identify_steps={source_config.embedding.identify_steps}"
+        raise CheckpointError(f"init={config.init}: is still identifying its robots; expected a run that is past its {steps}")
     if config.algorithm == "ddpg" and CRITIC not in source.params:
         raise CheckpointError(f"init={config.init}: published without its critic; start from seed 0 or a run folder")
     start = _start_ppo if config.algorithm == "ppo" else _start_ddpg

@@ -138,14 +138,35 @@ def test_an_episode_may_end_with_the_step_that_reaches_its_goal():
     assert 20 < int(jnp.sum(steps < learner.env.episode_length)) < 180
 
 
-def test_a_robots_failures_are_averaged_over_its_episodes():
-    learner = make((0.0, 0.0), warmup_episodes=1000)
+def test_a_robots_failures_are_averaged_over_its_episodes(monkeypatch):
+    learner = make.__wrapped__((0.0, 0.0), warmup_episodes=0, exploration_noise=0.0, random_action_probability=0.0)
+
+    def go_there_if_it_is_to_the_left(learned, index, obs, goal):
+        return jnp.where(goal[:, :1] < 0.0, goal - obs, 0.0)
+
+    monkeypatch.setattr(learner._explorer, "_policy", go_there_if_it_is_to_the_left)
     state = trained(learner, 1)
     episodes = jax.tree.map(lambda leaf: leaf[:10], state.replay.episodes)
     goal = jnp.broadcast_to(episodes.desired_goal[:, None], episodes.action.shape)
     success = learner.env.compute_reward(episodes.achieved_goal[:, 1:], goal, episodes.action)[1].any(axis=1)
+    assert 0 < int(success.sum()) < 10
     expected = [1.0 - 0.2 * float((success & (episodes.index == robot)).sum()) for robot in range(2)]
     np.testing.assert_allclose(state.failure, expected, atol=1e-6)
+
+
+def test_returns_are_of_more_steps_from_the_asked_share_of_the_run_on(monkeypatch):
+    learner = make.__wrapped__(n_step=3, n_step_from=0.5, updates_per_iteration=1)
+    state, draw, used = trained(make(), 1), learner._draw, []
+
+    def record(*arguments):
+        used.append(int(arguments[-1]))
+        return draw(*arguments)
+
+    monkeypatch.setattr(learner, "_draw", record)
+    for iteration, expected in ((20, {1}), (21, {3})):
+        used.clear()
+        learner._learn(state.replace(iteration=jnp.int32(iteration)), jax.random.key(0))
+        assert set(used) == expected
 
 
 def test_the_target_takes_the_smaller_value_of_two_critics():

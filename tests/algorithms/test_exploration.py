@@ -39,6 +39,25 @@ def test_a_robots_failures_move_towards_its_episodes_and_to_their_mean_if_they_a
     np.testing.assert_allclose(failure, [0.8, 0.5, 0.5], atol=1e-6)
 
 
+class StumblingEnv(PlaneEnv):
+    """The physics of the second step is not plausible; the point moves on."""
+
+    def step(self, state, action):
+        following, transition = super().step(state, action)
+        return following, transition.replace(diverged=state.physics == 1)
+
+
+def test_an_episode_that_reaches_its_goal_after_it_diverged_has_failed(key):
+    def go_there(learned, index, obs, goal):
+        return goal - obs
+
+    config = DDPGConfig(exploration_noise=0.0, random_action_probability=0.0)
+    for env, share in ((PlaneEnv((0.0,), episode_length=20), 1.0), (StumblingEnv((0.0,), episode_length=20), 0.0)):
+        played = Explorer(env, go_there, config, num_envs=10).play(None, jnp.ones(1), jnp.asarray(True), key)
+        assert float(played.sums["successes"]) == 10 * share
+        np.testing.assert_allclose(played.failure, 1.0 - share, atol=1e-6)
+
+
 def test_noise_is_correlated_from_step_to_step_as_asked():
     for correlation in (0.0, 0.8):
         explorer = make(exploration_correlation=correlation, random_action_probability=0.0, exploration_noise=0.1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from brax.training.agents.ppo.losses import compute_gae as brax_gae
 
-from hcp_jax.algorithms.returns import compute_gae, sum_rewards
+from hcp_jax.algorithms.returns import compute_gae, compute_n_step_returns
 
 
 def column(*values):
@@ -64,5 +64,5 @@ def test_it_equals_braxs_where_braxs_is_defined(seed):
 )
 def test_rewards_are_summed_to_the_first_success_or_the_last_step_that_counts(successes, num_steps, expected):
     success = jnp.isin(jnp.arange(3), jnp.asarray(successes, jnp.int32))[None]
-    result = sum_rewards(jnp.where(success, 1.0, -1.0), success, jnp.array([num_steps]), gamma=0.5)
+    result = compute_n_step_returns(jnp.where(success, 1.0, -1.0), success, jnp.array([num_steps]), gamma=0.5)
     np.testing.assert_allclose(jnp.concatenate(result), expected)

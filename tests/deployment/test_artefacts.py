@@ -239,7 +239,7 @@ def test_a_hoppers_policy_answers_as_the_package_does(tmp_path, rng):
     pool = make_heldout_pool(run.config.pool, 3)
     observations = rng.normal(size=(20, 11)).astype(np.float32)
     v_h = jnp.tile(heldout_v_h(run, state.params, pool)[2], (20, 1))
-    action = np.clip(run.ppo.mean_action(state.params["network"], state.obs_statistics, observations, v_h), -1, 1)
+    action = np.clip(run.learner.mean_action(state.params["network"], state.obs_statistics, observations, v_h), -1, 1)
     for answers in consume(tmp_path / "out", observations, tmp_path).values():
         np.testing.assert_allclose(answers / 200.0, action, atol=1e-5)
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "robot.xml"))

@@ -97,6 +97,40 @@ def test_a_joint_that_spins_off_is_observed_at_the_highest_speed(reacher, key):
     assert jnp.abs(after.obs[:, 7:]).max() <= MAX_SPEED + reacher.task.observation_noise
 
 
+def test_an_episode_goes_on_after_success(reacher, key):
+    state = reacher.reset(key, jnp.arange(4))
+    state = state.replace(desired_goal=state.achieved_goal)
+    there, transition = reacher.step(state, jnp.zeros((4, 7)))
+    assert transition.success.all()
+    after, _ = reacher.step(there, jnp.ones((4, 7)))
+    assert 0.0 < np.abs(after.physics.qpos - there.physics.qpos).max() < 0.5
+    for name in ("index", "desired_goal"):
+        np.testing.assert_array_equal(getattr(after, name), getattr(state, name))
+
+
+class BrokenPhysics:
+    """An engine that loses world 2."""
+
+    def __init__(self, physics):
+        self._physics = physics
+
+    def step(self, *arguments):
+        state, overflow = self._physics.step(*arguments)
+        return state.replace(qvel=state.qvel.at[2, 1].set(jnp.nan)), overflow
+
+
+def test_a_world_that_diverges_stays_where_it_was_last_plausible_and_says_so(reacher, key):
+    env = GoalEnv(reacher.task, reacher.pool, BrokenPhysics(reacher.physics))
+    state, after, transition = play(env, key, jnp.full((4, 7), 0.3))
+    assert transition.diverged.tolist() == [row == 2 for row in range(4)]
+    for name in ("qpos", "qvel"):
+        moved = np.any(getattr(after.physics, name) != getattr(state.physics, name), axis=-1)
+        assert moved.tolist() == [row != 2 for row in range(4)]
+    np.testing.assert_array_equal(after.achieved_goal[2], state.achieved_goal[2])
+    assert np.isfinite(after.obs).all()
+    assert np.isfinite(transition.reward).all()
+
+
 def test_missing_joints_are_0_and_their_actions_cost_and_do_nothing(reacher, key):
     action = jnp.zeros((4, 7)).at[:, 5:].set(1.0)
     _, idle, idle_transition = play(reacher, key, jnp.zeros((4, 7)))

@@ -84,9 +84,13 @@ def test_the_time_limit_truncates_and_does_not_terminate(env, step, key):
 def test_the_final_observation_is_kept_and_the_next_episode_starts_fresh_with_another_robot(env, step, key):
     index = jnp.arange(64, dtype=jnp.int32)
     state = env.reset(key, index)
-    for _ in range(5):
-        state, transition = step(state, jnp.ones((64, 3)) * 0.3)
+    action = jnp.full((64, 3), 0.3)
+    for _ in range(4):
+        state, _ = step(state, action)
+    ended, _ = jax.jit(env.step_without_reset)(state, action)
+    state, transition = step(state, action)
     assert transition.done.all()
+    np.testing.assert_allclose(transition.next_obs, ended.obs, atol=1e-6)
     np.testing.assert_array_equal(transition.index, index)
     assert np.abs(transition.next_obs - state.obs).max() > 0.01
     assert np.abs(np.asarray(state.obs)[:, 0] - 1.25).max() <= 0.005

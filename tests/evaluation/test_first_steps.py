@@ -33,15 +33,15 @@ def test_the_v_h_that_a_robots_steps_were_predicted_with_is_found_again(identifi
     statistics = state.model_statistics.replace(mean=jnp.zeros(2 * size), std=jnp.ones(2 * size))
     state = state.replace(params=state.params | {"network": network}, model_statistics=statistics)
     repeated = jnp.broadcast_to(v_h, (60, 5, 3))
-    change = run.ppo.network.apply(network, obs, action, repeated, method="predict")
-    found = fit_v_h(run.ppo, state, jnp.concatenate([obs, change], axis=-1), action, key)
+    change = run.learner.network.apply(network, obs, action, repeated, method="predict")
+    found = fit_v_h(run.learner, state, jnp.concatenate([obs, change], axis=-1), action, key)
     np.testing.assert_allclose(found, v_h, atol=0.05)
 
 
 def test_every_robot_makes_its_own_steps_and_starts_again_where_it_fell(identified, key):
     run, state = identified
     env = run.make_env(run.heldout_pool)
-    variables, actions = jax.jit(act, static_argnums=(0, 1, 3))(run.ppo, env, state, 60, key)
+    variables, actions = jax.jit(act, static_argnums=(0, 1, 3))(run.learner, env, state, 60, key)
     assert variables.shape == (60, 4, 2 * env.observation_size)
     assert actions.shape == (60, 4, env.action_size)
     obs, change = np.split(np.asarray(variables), 2, axis=-1)

@@ -22,8 +22,9 @@ from hcp_jax.training.metrics import MetricsWriter
 def swept(tiny_config, tmp_path_factory):
     """Two tiny experiments with two seeds each."""
     folder = tmp_path_factory.mktemp("sweep")
+    identified = dataclasses.replace(tiny_config.embedding, identify_steps=64)
     configs = [
-        dataclasses.replace(tiny_config, name="with", total_env_steps=128),
+        dataclasses.replace(tiny_config, name="with", total_env_steps=128, embedding=identified),
         dataclasses.replace(tiny_config, name="without", encoding="none", total_env_steps=128),
     ]
     (folder / "list.py").write_text(

@@ -35,7 +35,7 @@ PATIENCE = 1800.0  # [s] for a process to end by itself, on a machine that other
 def experiment(request, tiny_config, tiny_arms, tmp_path_factory) -> pathlib.Path:
     """A run of some seconds after start-up, with 40 evaluations."""
     config = tiny_config if request.param == "hopper" else tiny_arms
-    batch = config.batch_size
+    batch = config.steps_per_iteration
     config = dataclasses.replace(config, total_env_steps=4000 * batch, eval_every=100 * batch)
     path = tmp_path_factory.mktemp("experiment") / "experiment.py"
     path.write_text(
@@ -98,7 +98,7 @@ def assert_same_result(out: pathlib.Path, whole: pathlib.Path) -> None:
 
 def test_random_kills_lose_no_checkpoint_and_change_no_result(experiment, whole, tmp_path):
     out, draw = tmp_path / "killed", random.Random(0)
-    batch = read_config(whole).batch_size
+    batch = read_config(whole).steps_per_iteration
     kills = 0
     while kills < NUM_KILLS:
         before = newest_iteration(out)

@@ -33,7 +33,7 @@ def sweep(path: pathlib.Path, out: pathlib.Path) -> list[str]:
 
 
 def test_a_run_whose_worker_is_killed_goes_on_from_its_checkpoint_and_the_table_is_whole(tiny_config, tmp_path):
-    batch = tiny_config.batch_size
+    batch = tiny_config.steps_per_iteration
     config = dataclasses.replace(tiny_config, total_env_steps=3000 * batch, eval_every=100 * batch)
     path, out = write_list(tmp_path, [config]), tmp_path / "runs"
     process = subprocess.Popen(sweep(path, out), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)

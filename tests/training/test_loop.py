@@ -83,16 +83,17 @@ def test_a_resumed_run_writes_the_same_bytes_as_an_uninterrupted_one(finished_ru
     loop.run_folder.write_start(folder, tiny_config, run.physics)
     training = TrainingLoop(run, folder, checkpoints, 0)
     monkeypatch.setattr(loop, "_CHUNK_SECONDS", 0.0)
-    train_step = run.ppo.train
+    train_step = run.learner.train
 
     def train_and_interrupt(state, count):
         interrupt.requested = training._iteration + count >= cut
         return train_step(state, count)
 
-    run.ppo.train = train_and_interrupt
+    monkeypatch.setattr(run.learner, "train", train_and_interrupt)
     assert training.run(run.init_state(), interrupt) is None
     stopped = read_rows(folder / "timing.csv")
-    assert int(stopped[-1]["env_steps"]) == cut * tiny_config.batch_size
+    assert int(stopped[-1]["env_steps"]) == cut * tiny_config.steps_per_iteration
+    run.fitter._fitted = None  # fits v_h again, as another process does
     loop.train(tiny_config, folder, resume=True)
     assert (folder / "metrics.csv").read_bytes() == (finished_run / "metrics.csv").read_bytes()
     seconds = [float(row["seconds"]) for row in read_rows(folder / "timing.csv")]
@@ -113,7 +114,7 @@ def test_a_jitted_call_trains_for_some_seconds_whatever_an_iteration_takes(tiny_
         clock[0] += 0.4 * loop._CHUNK_SECONDS * count if len(counts) < 4 else 10 * loop._CHUNK_SECONDS
         return state
 
-    run.ppo.train = train_for
+    monkeypatch.setattr(run.learner, "train", train_for)
     training.run(run.init_state(), Interrupt())
     assert counts == [1, 2, 2, 2, 1]
 
@@ -182,14 +183,26 @@ def test_signals_are_what_they_were_once_training_ends(finished_run, tiny_config
     assert [signal.getsignal(name) for name in (signal.SIGINT, signal.SIGTERM)] == before
 
 
-def test_a_run_goes_on_from_its_folder_alone_and_may_be_given_more_steps(finished_run, tmp_path):
+def test_a_run_goes_on_from_its_folder_alone_and_may_be_given_more_steps(finished_run, tmp_path, capsys):
     folder = shutil.copytree(finished_run, tmp_path / "run")
     train.main(["--resume", "--out", str(folder), "--config.total_env_steps=640"])
     assert [int(row["env_steps"]) for row in metrics(folder)] == [128, 256, 384, 512, 640]
+    assert "640 steps instead of 512: stretched over the new length: the decay of the step sizes\n" in capsys.readouterr().out
     assert loop.run_folder.read_config(folder).total_env_steps == 640
     assert loop.run_folder.find_differences(*(loop.run_folder.read_config(f) for f in (finished_run, folder))) == [
         ("total_env_steps", 512, 640)
     ]
+
+
+def test_a_run_that_goes_on_has_no_picture_of_its_end(finished_run, tiny_config, tmp_path, monkeypatch):
+    folder = shutil.copytree(finished_run, tmp_path / "run")
+    config = dataclasses.replace(tiny_config, total_env_steps=640)
+    run = loop.make_experiment(tiny_config)
+    monkeypatch.setattr(run.learner, "train", lambda state, count: state)
+    interrupt = Interrupt(requested=True)
+    run = dataclasses.replace(run, config=config)
+    assert loop._run(run, run.init_state(), folder, resume=True, interrupt=interrupt) is None
+    assert not (folder / "curves.png").exists()
 
 
 def test_a_run_is_not_given_fewer_steps_than_it_has_done(finished_run, tiny_config, tmp_path):
@@ -238,7 +251,7 @@ def test_a_warm_start_identifies_its_robots_under_the_old_actor_with_the_old_for
     jax.tree.map(np.testing.assert_array_equal, get_actor(state.params, state.obs_statistics), source.reserve)
     hidden = np.asarray(state.reserve.network["policy"]["hidden_1"]["kernel"])
     start = np.asarray(state.params["embedding"])
-    state = run.ppo.train(jax.tree.map(jnp.copy, state), run.ppo.identify_iterations)
+    state = run.learner.train(jax.tree.map(jnp.copy, state), run.learner.identify_iterations)
     models = [params["network"]["params"]["forward_model"] for params in (state.params, source.params)]
     jax.tree.map(np.testing.assert_array_equal, *models)
     np.testing.assert_array_equal(state.params["network"]["params"]["policy"]["hidden_1"]["kernel"], hidden)
@@ -321,6 +334,14 @@ def test_arms_do_not_start_from_a_policy_that_was_published_without_its_critic(f
     write_policy(tmp_path, load_policy(finished_arms, loop.make_experiment(tiny_arms))[1], critic=False)
     with pytest.raises(CheckpointError, match="published without its critic"):
         load_init(dataclasses.replace(tiny_arms, init=str(tmp_path)))
+
+
+def test_hoppers_do_not_start_from_a_run_that_is_still_identifying_its_robots(tiny_config, tmp_path):
+    run = loop.make_experiment(tiny_config)
+    loop.run_folder.write_start(tmp_path, tiny_config, run.physics)
+    write_policy(tmp_path, run.init_state().replace(iteration=jnp.int32(run.learner.identify_iterations - 1)))
+    with pytest.raises(CheckpointError, match="is still identifying its robots; expected a run that is past"):
+        load_init(dataclasses.replace(tiny_config, init=str(tmp_path)))
 
 
 def test_hoppers_do_not_start_from_an_arms_run(finished_arms, tiny_config):
