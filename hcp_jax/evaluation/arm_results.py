@@ -9,7 +9,7 @@ from hcp_jax.evaluation.files import write_json
 from hcp_jax.evaluation.groups import group_folders
 from hcp_jax.evaluation.publishing import plot_groups, publish_runs
 from hcp_jax.evaluation.summary import SUCCESSES, summarise_runs
-from hcp_jax.evaluation.table1 import make_table1
+from hcp_jax.evaluation.table1 import find_stale, make_table1
 from hcp_jax.training.run_folder import read_config
 
 
@@ -35,6 +35,7 @@ def collect_arms(folders: Sequence[pathlib.Path], results: pathlib.Path) -> list
         rows = make_rows(results)
         write_json(results / f"{name}.json", rows)
         written.append(f"{results}/{name}.json: {len(rows)} rows")
+    written += find_stale(results)
     written.append(f"{out}/summary.json: {', '.join(group_folders(published))}")
     return written
 

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from matplotlib.figure import Figure
 
 from hcp_jax.config import ConfigError
-from hcp_jax.evaluation.files import naming
-from hcp_jax.evaluation.summary import average_curves, read_curve
+from hcp_jax.evaluation.summary import average_curves, read_curve, read_last_steps
 from hcp_jax.experiment.base import TrainingState
 from hcp_jax.experiment.build import make_experiment
 from hcp_jax.training.metrics import METRICS_FILE, TIMING_FILE, read_rows
@@ -80,15 +79,9 @@ def _check_replaceable(folder: pathlib.Path, policy: pathlib.Path, run: pathlib.
         raise ConfigError(
             f"{folder}: its {name} is {new!r}, and {old!r} in {policy}, which it would replace; name it otherwise"
         )
-    steps, published = (_last_steps(each) for each in (folder, run))
+    steps, published = (read_last_steps(each) for each in (folder, run))
     if steps < published:
         raise ConfigError(f"{folder}: evaluated up to {steps:,} steps, and {run}, which it would replace, up to {published:,}")
-
-
-def _last_steps(folder: pathlib.Path) -> int:
-    """Control steps at a run's last evaluation; 0 of one that is not there."""
-    with naming(folder / METRICS_FILE):
-        return max((int(row["env_steps"]) for row in read_rows(folder / METRICS_FILE)), default=0)
 
 
 def _read_run(folder: pathlib.Path) -> tuple[dict[str, bytes], TrainingState]:

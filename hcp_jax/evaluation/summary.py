@@ -94,6 +94,11 @@ def read_run_commit(folder: pathlib.Path) -> str:
         return record["commit"] or "unknown"
 
 
+def read_last_steps(folder: pathlib.Path) -> int:
+    """Control steps at a run's last evaluation; 0 where there is none. Raises RunFolderError if its metrics are damaged."""
+    return max((int(row["env_steps"]) for row in read_rows(folder / METRICS_FILE)), default=0)
+
+
 def read_curve(folder: pathlib.Path, column: str) -> np.ndarray:
     """Control steps and `column` of each evaluation of a run: [E, 2]. Raises RecordError if its metrics are damaged."""
     with naming(folder / METRICS_FILE):

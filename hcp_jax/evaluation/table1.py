@@ -1,15 +1,20 @@
 """The paper's table 1 beside ours: zero-shot success on the type left out, one row for each policy that was evaluated."""
 
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from hcp_jax.config import ArmConfig, ArmPoolConfig, Config
 from hcp_jax.evaluation.files import naming, number, optional_number, read_json
 from hcp_jax.evaluation.groups import group_by_settings
-from hcp_jax.evaluation.summary import deviation_over_seeds, name_algorithm, read_run_commit, read_wall_seconds
-from hcp_jax.training.metrics import METRICS_FILE, read_rows
+from hcp_jax.evaluation.summary import (
+    deviation_over_seeds,
+    name_algorithm,
+    read_last_steps,
+    read_run_commit,
+    read_wall_seconds,
+)
 from hcp_jax.training.run_folder import read_config
 
 # (task, hole moves, type left out): experiment of HCP-E (that of DDPG+HER is the next), mean and deviation of each [%].
@@ -50,31 +55,46 @@ def make_table1(results: pathlib.Path) -> list[dict]:
 
 
 def group_evaluations(results: pathlib.Path) -> Sequence[Runs]:
-    """The evaluated runs of each experiment that leaves one type out and was evaluated on it.
+    """The evaluated runs of each experiment that leaves one type out and was evaluated on it, but for stale records
+    (`find_stale`).
 
     Those together have equal settings (seed aside), equal control steps and equally many trials and robots in each.
     """
     runs: list[tuple[str, dict, Config]] = []
-    for path in sorted((results / "arms" / "evaluations").glob("*.json")):
-        folder = results / "arms" / "runs" / path.stem
-        if folder.is_dir():  # of a whole run: others have another name
-            record, config = read_json(path, dict), read_config(folder)
-            assert isinstance(config.pool, ArmPoolConfig)
-            with naming(path):
-                _check_record(record, folder)
-                if len(config.pool.left_out) == 1 and config.pool.left_out[0] in record["types"]:
-                    runs.append((path.stem, record, config))
+    for path, record, folder in _read_records(results):
+        config = read_config(folder)
+        assert isinstance(config.pool, ArmPoolConfig)
+        is_of_type = len(config.pool.left_out) == 1 and config.pool.left_out[0] in record["types"]
+        if is_of_type and record["checkpoint_env_steps"] == read_last_steps(folder):
+            runs.append((path.stem, record, config))
     return group_by_settings(runs, lambda run: run[2], lambda run: tuple(run[1][name] for name in _MEASURED))
 
 
-def _check_record(record: dict, run: pathlib.Path) -> None:
-    """Raises KeyError, TypeError or ValueError unless an evaluation's record has what tables are made of, and is of the policy
-    that the run in folder `run` ended with."""
-    if pathlib.PurePath(record["run"]).name != run.name:
-        raise ValueError(f"run={record['run']!r}: expected the policy {run.name}")
-    steps = int(read_rows(run / METRICS_FILE)[-1]["env_steps"])
-    if record["checkpoint_env_steps"] != steps:
-        raise ValueError(f"checkpoint_env_steps={record['checkpoint_env_steps']}: expected {steps}, where its run ends")
+def find_stale(results: pathlib.Path) -> list[str]:
+    """A line for each evaluation that was made before its run was published with more steps."""
+    steps = {path: (record["checkpoint_env_steps"], read_last_steps(run)) for path, record, run in _read_records(results)}
+    return [
+        f"{path}: after {evaluated:,} steps, and its run ends at {last:,}; not in the tables"
+        for path, (evaluated, last) in steps.items()
+        if evaluated != last
+    ]
+
+
+def _read_records(results: pathlib.Path) -> Iterator[tuple[pathlib.Path, dict, pathlib.Path]]:
+    """The evaluations of whole runs, which others are not named after: file, record and the run's folder."""
+    for path in sorted((results / "arms" / "evaluations").glob("*.json")):
+        folder = results / "arms" / "runs" / path.stem
+        if folder.is_dir():
+            record = read_json(path, dict)
+            with naming(path):
+                _check_record(record, path.stem)
+            yield path, record, folder
+
+
+def _check_record(record: dict, policy: str) -> None:
+    """Raises KeyError, TypeError or ValueError unless an evaluation's record has what tables are made of, of that policy."""
+    if pathlib.PurePath(record["run"]).name != policy:
+        raise ValueError(f"run={record['run']!r}: expected the policy {policy}")
     for name in _MEASURED:
         if not isinstance(record[name], str):
             number(record[name])

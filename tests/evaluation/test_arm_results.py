@@ -90,23 +90,25 @@ def test_table_1_averages_evaluations_of_equal_settings_and_steps_alone(results,
     assert (both["success_mean"], both["success_std_over_seeds"]) == (15.0, 7.07), "the deviation is a sample's"
 
 
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        ({"run": "runs/arms_s7"}, "run='runs/arms_s7': expected the policy arms_s0"),
-        ({"checkpoint_env_steps": 80}, "checkpoint_env_steps=80: expected 320, where its run ends"),
-    ],
-)
-def test_an_evaluation_of_another_policy_is_refused_before_anything_is_written(
-    change, expected, results, finished_arms, tmp_path, capsys
-):
+def test_an_evaluation_from_before_its_run_went_on_is_said_and_is_in_no_table(results, tmp_path, capsys):
+    shutil.copytree(results, tmp_path / "results")
+    path = tmp_path / "results" / "arms" / "evaluations" / "arms_s0.json"
+    record = json.loads(path.read_text())
+    assert make_table1(tmp_path / "results")
+    path.write_text(json.dumps(record | {"checkpoint_env_steps": 240}))
+    collect.main(["--out", str(tmp_path / "results")])
+    assert f"{path}: after 240 steps, and its run ends at 320; not in the tables" in capsys.readouterr().out
+    assert not json.loads((tmp_path / "results" / "table1.json").read_text())
+
+
+def test_an_evaluation_of_another_policy_is_refused_before_anything_is_written(results, finished_arms, tmp_path, capsys):
     shutil.copytree(results, tmp_path / "results")
     shutil.copytree(finished_arms, tmp_path / "runs" / "arms_s1")
     path = tmp_path / "results" / "arms" / "evaluations" / "arms_s0.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"run": "runs/arms_s7"}))
     with pytest.raises(SystemExit):
         collect.main([str(tmp_path / "runs"), "--out", str(tmp_path / "results")])
-    assert expected in capsys.readouterr().err
+    assert "run='runs/arms_s7': expected the policy arms_s0" in capsys.readouterr().err
     assert not (tmp_path / "results" / "policies" / "arms_s1").exists()
 
 
