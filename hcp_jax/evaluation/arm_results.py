@@ -9,7 +9,7 @@ from hcp_jax.evaluation.files import write_json
 from hcp_jax.evaluation.groups import group_folders
 from hcp_jax.evaluation.publishing import plot_groups, publish_runs
 from hcp_jax.evaluation.summary import SUCCESSES, summarise_runs
-from hcp_jax.evaluation.table1 import find_stale, make_table1
+from hcp_jax.evaluation.table1 import PREFIXES, find_stale, make_table1
 from hcp_jax.training.run_folder import read_config
 
 
@@ -44,5 +44,5 @@ def name_setting(config: Config) -> str:
     """What runs have in common that can be compared: the task, and the types that are left out, as in `random_peg_leave_h`."""
     assert isinstance(config.env, ArmConfig)
     assert isinstance(config.pool, ArmPoolConfig)
-    task = "reacher" if config.task == "reacher" else "random_peg" if config.env.random_hole else "peg"
-    return f"{task}_leave_{''.join(config.pool.left_out).lower()}" if config.pool.left_out else f"{task}_other"
+    prefix = PREFIXES[config.task, config.env.random_hole > 0]
+    return f"{prefix}_leave_{''.join(config.pool.left_out).lower()}" if config.pool.left_out else f"{prefix}_other"

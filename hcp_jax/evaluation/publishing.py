@@ -52,7 +52,7 @@ def publish_runs(
     """
     for folder in folders:
         _check_replaceable(folder, policies / folder.name, out / "runs" / folder.name)
-    read = [(folder.name, *_read_run(folder), read_config(folder).seed == 0) for folder in folders]
+    read = [(folder.name, *_read_run(folder)) for folder in folders]
     lines = [f"{out}/runs, {policies}: {', '.join(folder.name for folder in folders)}"] if folders else []
     for name, files, state, critic in read:
         _write_files(policies / name, {key: files[key] for key in files if key not in (TIMING_FILE, METRICS_FILE)})
@@ -84,13 +84,13 @@ def _check_replaceable(folder: pathlib.Path, policy: pathlib.Path, run: pathlib.
         raise ConfigError(f"{folder}: evaluated up to {steps:,} steps, and {run}, which it would replace, up to {published:,}")
 
 
-def _read_run(folder: pathlib.Path) -> tuple[dict[str, bytes], TrainingState]:
-    """The files of a run that are published, and a state that holds its newest policy."""
+def _read_run(folder: pathlib.Path) -> tuple[dict[str, bytes], TrainingState, bool]:
+    """The files of a run that are published, a state that holds its newest policy, and whether the critic is published too."""
     config = read_config(folder)
     saved = saved_robot_path(folder, config)
     names = (str(saved.relative_to(folder)), *_FILES) if saved.exists() else _FILES
     files = {name: (folder / name).read_bytes() for name in names}
-    return files, load_policy(folder, make_experiment(config))[1]
+    return files, load_policy(folder, make_experiment(config))[1], config.seed == 0
 
 
 def _write_files(folder: pathlib.Path, files: Mapping[str, bytes]) -> None:

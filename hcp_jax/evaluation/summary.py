@@ -44,7 +44,7 @@ def summarise_runs(folders: Sequence[pathlib.Path]) -> list[dict]:
 def _summarise_group(runs: list[tuple[Config, pathlib.Path, dict]]) -> dict:
     config, _, last_row = runs[0]
     row = {
-        "algorithm": name_algorithm(config),
+        "algorithm": name_algorithm(config.algorithm, config.encoding),
         "encoding": config.encoding,
         "name": config.name,
         "runs": [folder.name for _, folder, _ in runs],
@@ -68,9 +68,9 @@ def deviation_over_seeds(values: Sequence[float]) -> float | None:
     return float(np.std(values, ddof=1)) if len(values) > 1 else None
 
 
-def name_algorithm(config: Config) -> str:
+def name_algorithm(algorithm: str, encoding: str) -> str:
     """The paper's name of an algorithm with its v_h; controls are named after what they add to the baseline."""
-    baseline, encoding = BASELINES[config.algorithm], config.encoding
+    baseline = BASELINES[algorithm]
     if encoding == "none":
         return baseline
     return ALGORITHM_NAMES.get(encoding, f"{baseline}+{encoding.removeprefix('none+')}")

@@ -28,8 +28,8 @@ PAPER = {
     ("peg_insertion", True, "E"): (13, (76.1, 3.96), (0.0, 0.0)),
     ("peg_insertion", True, "I"): (15, (23.5, 4.22), (0.2, 0.4)),
 }
-
-
+# How names of a task's experiments begin, with a hole that moves or not.
+PREFIXES = {("reacher", False): "reacher", ("peg_insertion", False): "peg", ("peg_insertion", True): "random_peg"}
 # What evaluations of one row have in common.
 _MEASURED = ("checkpoint_env_steps", "trials", "robots_per_trial", "physics", "integrator")
 
@@ -153,7 +153,7 @@ def make_row(
         "task": config.task,
         "train_types": "".join(config.pool.types),
         "test_type": test_type,
-        "algorithm": name_algorithm(config),
+        "algorithm": name_algorithm(config.algorithm, config.encoding),
         "encoding": config.encoding,
         "joint_slots": config.env.joint_slots,
         "network": config.ddpg.network,

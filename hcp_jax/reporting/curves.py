@@ -134,7 +134,7 @@ def draw_groups(
     caption: str,
     label: str = LABEL,
     limits: tuple[float, float] | None = LIMITS,
-    name: Callable[[Config], str] = lambda config: f"{name_algorithm(config)}: {config.name}",
+    name: Callable[[Config], str] = lambda config: f"{name_algorithm(config.algorithm, config.encoding)}: {config.name}",
 ) -> Figure | None:
     """A panel with a line for each group of seeds that has the column; None if none has."""
     lines, files = [], []

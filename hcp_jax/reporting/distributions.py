@@ -8,7 +8,7 @@ from hcp_jax.config import ArmConfig
 from hcp_jax.evaluation.appendix import PAPER_DAMPING
 from hcp_jax.evaluation.files import naming
 from hcp_jax.evaluation.records import Evaluation, Outcome, read_evaluation
-from hcp_jax.evaluation.summary import ALGORITHM_NAMES, BASELINES
+from hcp_jax.evaluation.summary import name_algorithm
 from hcp_jax.reporting.curves import make_curves, train_commands
 from hcp_jax.reporting.page import Figure, Item, Row, Section, Table
 from hcp_jax.reporting.plots import Spread, draw_spreads
@@ -123,11 +123,6 @@ def read_damping(published: Published) -> list[tuple[tuple[float, float], Evalua
     return sorted(records, key=lambda record: record[0])
 
 
-def name_evaluated(evaluation: Evaluation) -> str:
-    """The algorithm of an evaluated policy of arms."""
-    return ALGORITHM_NAMES.get(evaluation.encoding, BASELINES["ddpg"])
-
-
 def name_range(damping: tuple[float, float]) -> str:
     return f"{damping[0]:g} to {damping[1]:g}"
 
@@ -138,7 +133,7 @@ def damping_lines(damping: tuple[float, float], evaluation: Evaluation) -> list[
     for robot_type, outcome in evaluation.types.items():
         cells = (
             name_range(damping),
-            name_evaluated(evaluation),
+            name_algorithm("ddpg", evaluation.encoding),
             robot_type,
             spread(outcome.success_mean, outcome.success_std if evaluation.trials > 1 else None),
             decimals(paper),
@@ -162,8 +157,8 @@ def draw_damping(
     spreads = []
     for damping, evaluation in records:
         for outcome in evaluation.types.values():
-            seed = evaluation.policy.rpartition("_")[2]
-            place = name_range(damping) + f"\n{name_evaluated(evaluation)}\n{seed}" * several
+            algorithm, seed = name_algorithm("ddpg", evaluation.encoding), evaluation.policy.rpartition("_")[2]
+            place = name_range(damping) + f"\n{algorithm}\n{seed}" * several
             spreads.append(spread_of(place, evaluation.encoding, outcome, take(outcome)))
     if label != DISTANCE:  # records without single episodes have quantiles of the distance alone
         spreads = [spread for spread in spreads if spread.values is not None]

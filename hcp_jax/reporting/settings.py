@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from hcp_jax.evaluation.table1 import PAPER
+from hcp_jax.evaluation.table1 import PAPER, PREFIXES
 
 TASKS = ("reacher", "peg insertion, fixed hole", "peg insertion, random hole")
 ROMAN = ("I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX", "X", "XI", "XII", "XIII", "XIV", "XV", "XVI")
@@ -62,11 +62,10 @@ def roman(experiment: int | None) -> str:
 
 
 def _settings() -> tuple[Setting, ...]:
-    settings = []
+    settings, names = [], dict(zip(PREFIXES.values(), TASKS, strict=True))
     for (task, moves, left_out), (experiment, *paper) in PAPER.items():
-        number = 0 if task == "reacher" else 2 if moves else 1
-        prefix = ("reacher", "peg", "random_peg")[number]
-        settings.append(Setting(experiment, TASKS[number], prefix, left_out, (paper[0], paper[1])))
+        prefix = PREFIXES[task, moves]
+        settings.append(Setting(experiment, names[prefix], prefix, left_out, (paper[0], paper[1])))
     return tuple(settings)
 
 
